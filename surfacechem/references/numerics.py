@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.references.base import Array
-from surfacechem.tolerances import FEW_EPS, SQRT_EPS
+from surfacechem.tolerances import FEW_EPS, QUARTER_EPS, SQRT_EPS
 
 MOST_ITERATIONS = 400
 """Largest number of iterations: bisection alone takes 52, and one for each factor of two between the bracket's ends."""
@@ -55,9 +55,10 @@ def increasing_root(
     """Return the arguments at which an increasing `function`, given as value and slope, reaches `target` in [low,
     high]; ``along`` are its further arguments, an entry for each root.
 
-    Newton's method inside a shrinking bracket, from `low` unless a better guess is given. It ends when the next step,
-    predicted from the last two by quadratic convergence, is below the last digit, since rounding causes such steps
-    without end.
+    Newton's method inside a shrinking bracket, from `low` unless a better guess is given. Without further arguments all
+    roots are of one function: cubics through the first values on both sides of each give the next guess. It ends when
+    the next step, predicted by quadratic convergence, is below the last digit, since rounding causes such steps without
+    end.
 
     >>> increasing_root(lambda x: (x**2, 2 * x), np.array([2.0]), np.array([1.0]), np.array([2.0]))
     array([1.41421356])
@@ -71,19 +72,57 @@ def increasing_root(
         error = value - target
         low, high = np.where(error <= 0.0, x, low), np.where(error >= 0.0, x, high)
         with np.errstate(all="ignore"):
-            newton = x - error / slope
-        inside = (newton > low) & (newton < high)
-        following = np.where(inside, newton, 0.5 * (low + high))
+            following = x - error / slope
+            near = bend = np.full(len(x), np.nan)
+            if not along and len(x) > 1:
+                near, low, high, bend = _between(x, value, slope, target, low, high)
+            # From QUARTER_EPS on two of Newton's steps are enough.
+            shared = (near > low) & (near < high) & (np.abs(following - x) > QUARTER_EPS * np.abs(x))
+            following = np.where(shared, near, following)
+            inside = (following > low) & (following < high)
+            following = np.where(inside, following, 0.5 * (low + high))
+            step = np.minimum(np.abs(following - x), high - low)
+            after = step**2 * np.where(np.isnan(bend), step / before**2, bend)
         reached = np.abs(error) <= FEW_EPS * np.abs(target)
-        step = np.minimum(np.abs(following - x), high - low)
-        last = inside & (step <= SQRT_EPS * np.abs(x)) & (step**3 <= FEW_EPS * np.abs(x) * before**2)
+        last = inside & (step <= SQRT_EPS * np.abs(x)) & (after <= FEW_EPS * np.abs(x))
         goes_on = ~(reached | (step <= FEW_EPS * np.abs(x)) | last)
-        x, before = np.where((error == 0.0) | (reached & ~inside), x, following), step
+        x, before = np.where((error == 0.0) | (reached & ~inside), x, following), np.where(shared, 0.0, step)
         found[left] = x
         if not goes_on.all():  # most of the time is that of the function
             left, x, before, low, high, target = (each[goes_on] for each in (left, x, before, low, high, target))
             along = tuple(each[goes_on] for each in along)
     raise ArithmeticError(f"no root found between {low} and {high}")
+
+
+def _between(x: Array, value: Array, slope: Array, target: Array, low: Array, high: Array) -> tuple[Array, ...]:
+    """Return guesses for the roots of an increasing function from values and slopes at some points, by cubics through
+    two neighbours of each root; smaller brackets; and half the relative change of the slope over x.
+
+    NaN for roots that are not between two points of similar slopes.
+    """
+    order = np.argsort(value, kind="stable")
+    x, value, slope = x[order], value[order], slope[order]
+    right = np.searchsorted(value, target)
+    is_inside = (right > 0) & (right < len(x))
+    right = np.clip(right, 1, len(x) - 1)
+    (x_0, x_1), (f_0, f_1), (slope_0, slope_1) = ((each[right - 1], each[right]) for each in (x, value, slope))
+    low, high = np.where(is_inside, np.maximum(low, x_0), low), np.where(is_inside, np.minimum(high, x_1), high)
+    bend = np.abs(slope_1 - slope_0) / (slope_1 + slope_0) / (x_1 - x_0)
+    alike = is_inside & (slope_1 < 2 * slope_0) & (slope_0 < 2 * slope_1)
+    guess = cubic(target, (f_0, f_1), (x_0, x_1), (1 / slope_0, 1 / slope_1))
+    return np.where(alike, guess, np.nan), low, high, np.where(alike, bend, np.nan)
+
+
+def cubic(t: Array, times: tuple[Array, Array], values: tuple[Array, Array], slopes: tuple[Array, Array]) -> Array:
+    """Return the cubics with these values and slopes at two times each.
+
+    >>> float(cubic(np.array(0.5), (np.array(0.0), np.array(1.0)), (np.array(0.0), np.array(1.0)), (0.0, 3.0)))
+    0.125
+    """
+    length, rise = times[1] - times[0], values[1] - values[0]
+    part = (t - times[0]) / length
+    bend = slopes[0] * length - rise, rise - slopes[1] * length
+    return np.asarray(values[0] + part * (rise + (1 - part) * ((1 - part) * bend[0] + part * bend[1])))
 
 
 def short_integral(function: Callable[[Array], Array], upper: Array) -> Array:
@@ -109,23 +148,32 @@ class AutonomousODE:
         self.nodes, self.weights = gauss(GAUSS_POINTS)
         half = 0.5 * length
         steps = half * 0.5 ** np.arange(1.0, INNER_HALVINGS)
+        quartered = half * 0.25 ** np.arange(END_QUARTERINGS + 1.0)
         edges = []
-        for found in ([x for x in hard if x < half], [length - x for x in hard if x >= half]):
+        for of_end, found in ((False, [x for x in hard if x < half]), (True, [length - x for x in hard if x >= half])):
+            with np.errstate(all="ignore"):
+                rates = self._rate(quartered, np.full(len(quartered), of_end))
+            # Below the last edge at which the rate differs from that at the end, one panel is enough.
+            differs = ~np.isclose(rates, rates[-1], rtol=FEW_EPS, atol=0.0)
+            last = int(np.flatnonzero(np.append(True, differs))[-1])
             near = [x + step for x in found for step in (*-steps, 0.0, *steps)]
-            points = np.array([0.0, *half * 0.25 ** np.arange(END_QUARTERINGS + 1.0), *near])
+            points = np.array([0.0, *quartered[: last + 1], *near])
             edges.append(np.unique(points[(points >= 0.0) & (points <= half)]))
         early, late = edges
         # Distances of a panel are measured from the nearer end: the start in the first half, the end in the second.
         self.first, self.last = np.append(early[:-1], late[:0:-1]), np.append(early[1:], late[-2::-1])
         self.from_end = np.arange(len(self.first)) >= len(early) - 1
-        self.times = np.append(0.0, np.cumsum(self._elapsed(self.first, self.last, self.from_end)))
+        self.slowness = self._slowness(self.first, self.last, self.from_end)
+        self.times = np.append(0.0, np.cumsum(self.slowness @ self.weights))
 
-    def _elapsed(self, first: Array, last: Array, from_end: NDArray[np.bool_]) -> Array:
-        """Return the time between two points of one panel."""
+    def _slowness(self, first: Array, last: Array, from_end: NDArray[np.bool_]) -> Array:
+        """Return the inverse rates at the Gauss points between two points of one panel, in units of half their time
+        per distance, shape (intervals, points).
+        """
         middle, half = 0.5 * (first + last)[:, None], 0.5 * (last - first)[:, None]
         with np.errstate(all="ignore"):  # zero time where the rate overflows
-            times = np.abs(half) / self._rate(middle + half * self.nodes, from_end[:, None]) @ self.weights
-        return np.where(first == last, 0.0, times)
+            slowness = np.abs(half) / self._rate(middle + half * self.nodes, from_end[:, None])
+        return np.where(half == 0.0, 0.0, slowness)
 
     def _rate(self, distance: Array, from_end: NDArray[np.bool_]) -> Array:
         rest = self.length - distance
@@ -144,15 +192,38 @@ class AutonomousODE:
 
         def elapsed(share: Array, start: Array, stop: Array, from_end: NDArray[np.bool_]) -> tuple[Array, Array]:
             point = start + share * (stop - start)
-            return self._elapsed(start, point, from_end), np.abs(stop - start) / self._rate(point, from_end)
+            time = self._slowness(start, point, from_end) @ self.weights
+            return time, np.abs(stop - start) / self._rate(point, from_end)
 
         target = np.minimum(t, self.duration) - self.times[j]
-        with np.errstate(all="ignore"):
-            guess = np.nan_to_num(target / (self.times[j + 1] - self.times[j]))
+        guess = self._guess(target, self.slowness[j])
         share = increasing_root(elapsed, target, np.zeros_like(target), np.ones_like(target), guess, *panels)
         distance = np.where(t < self.duration, start + share * (stop - start), 0.0)
         rest = self.length - distance
         return np.where(from_end, rest, distance), np.where(from_end, distance, rest)
+
+    def _guess(self, t: Array, slowness: Array) -> Array:
+        """Return the shares of panels covered at times since their starts, by cubics between Gauss points."""
+        times, row = slowness @ _running_weights().T, np.arange(len(t))
+        right = np.clip((times < t[:, None]).sum(axis=1), 1, GAUSS_POINTS - 1)
+        left, shares = right - 1, 0.5 * (1.0 + self.nodes)
+        with np.errstate(all="ignore"):
+            slopes = 0.5 / slowness[row, left], 0.5 / slowness[row, right]
+            guess = cubic(t, (times[row, left], times[row, right]), (shares[left], shares[right]), slopes)
+        return np.where(t > 0.0, np.nan_to_num(guess), 0.0)
+
+
+@cache
+def _running_weights() -> Array:
+    r"""Return the weights of the integrals from -1 to each Gauss point, shape (points, points).
+
+    They integrate the polynomials :math:`l_j=w_j\sum_k(k+\tfrac12)P_k(x_j)P_k` that are one at a point and zero at the
+    others; the integral of :math:`(2k+1)P_k` is :math:`P_{k+1}-P_{k-1}`.
+    """
+    nodes, weights = gauss(GAUSS_POINTS)
+    P = np.polynomial.legendre.legvander(nodes, GAUSS_POINTS).T
+    rises = P[1:] - np.concatenate((-np.ones((1, GAUSS_POINTS)), P[:-2]))
+    return np.asarray(0.5 * weights * (rises.T @ P[:-1]))
 
 
 INVERSE_FACTORIALS = [1.0 / math.factorial(k) for k in range(2, 21)]

@@ -499,6 +499,12 @@ class AdiabaticArrhenius(Reference):
         phi = -np.expm1(-increasing_root(self._scaled_time, scaled, scaled, scaled * np.exp(span)))
         return {"phi": phi, "T": self.T_i + self.delta_T * phi}
 
+    @cached_property
+    def _at_start(self) -> float:
+        s_i = self._initial_exponent
+        left, whole = scaled_Ei(np.array([s_i * self.delta_T / (self.T_i + self.delta_T), s_i])).tolist()
+        return float(left - whole)
+
     def time(self, phi: Array) -> Array:
         """Return the time [s] at which the bonding state is phi."""
         return self._scaled_time(-np.log1p(-phi))[0] / self.initial_rate
@@ -512,11 +518,10 @@ class AdiabaticArrhenius(Reference):
             return np.asarray(np.exp(-s_i * rise / (self.T_i + rise)))
 
         T = self.T_i - self.delta_T * np.expm1(-unreacted)
-        at_start = scaled_Ei(np.array([s_i * self.delta_T / final])) - scaled_Ei(np.array([s_i]))
         now = scaled_Ei(s_i * self.T_i / T * left / final) - scaled_Ei(s_i * self.T_i / T)
         early = unreacted * max(1.0, self.delta_T / self.T_i * max(1.0, s_i)) < 0.25  # the integrals would cancel
         steepness = slope(unreacted)
-        return np.where(early, short_integral(slope, unreacted), at_start - steepness * now), steepness
+        return np.where(early, short_integral(slope, unreacted), self._at_start - steepness * now), steepness
 
 
 class KamalCureConstantCapacity(Reference):

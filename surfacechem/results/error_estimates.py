@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -46,6 +47,9 @@ from surfacechem.tolerances import (
     RUN_ERROR,
     SQRT_EPS,
 )
+
+if TYPE_CHECKING:
+    from surfacechem.references.base import Reference
 
 ENDED_EARLIER = "ended earlier"
 """Note on a second run that ended before the first one."""
@@ -143,20 +147,21 @@ def against_exact(
 ) -> Accuracy:
     """Return the largest errors at the times at which the run is compared, and those of the times of events.
 
-    Event times are compared with a second run. It is made if ``second`` is not given and the errors ``late`` of event
-    times are unknown. InputError if the exact solution is another scene's.
+    Event times are compared with the end of the exact solution if all events are there, else with a second run, which
+    is made if ``second`` is not given and the errors ``late`` of event times are unknown. InputError if the exact
+    solution is another scene's.
     """
     from surfacechem.references.base import SceneView
-    from surfacechem.results.matching import exact_values, match
+    from surfacechem.results.matching import exact_values, in_range, match
 
-    # Exact solutions have no list of events: the times of events are compared with a second run.
-    if late is None and trajectory.result.status not in SPENT and (found := event_times(trajectory)):
-        late = event_errors(found, event_times(second or _second_events(trajectory)), trajectory.run.times[-1])
-    late = dict(late or {})
+    # Its parameters are read at the start of the run.
+    reference = match(name, options, SceneView(scene, trajectory.picked(slice(1))))
+    if late is None:
+        with in_range():
+            late = _event_errors(trajectory, reference, second)
     latest = max(late.values(), default=0.0)
     # With cells, whose layers are unresolved at first, errors are taken at the requested times.
     seen = trajectory if trajectory.model.system.profiles else fewer(trajectory.stored, latest)
-    reference = match(name, options, SceneView(scene, seen))
     exact = exact_values(reference, scene, seen, to_the_end=True, side=max(SIDE, latest))
     alike = _off_events(seen, latest)
     for values in exact.values():  # a solution that ends with an infinite slope has no value at its last moment
@@ -165,10 +170,23 @@ def against_exact(
     if not alike.all():
         ours, known = ({key: each[key][alike] for key in exact} for each in (ours, known))
     true = exact if alike.all() else {key: values[alike] for key, values in exact.items()}
-    errors = largest_errors(ours, true, known) | late
+    errors = largest_errors(ours, true, known) | dict(late)
     error = stated(errors)
     at = partial(exact_values, reference, scene, to_the_end=True, side=max(SIDE, error), tested=False)
     return Accuracy(error, f"exact solution {name}", errors, at)
+
+
+def _event_errors(trajectory: Trajectory, reference: Reference, second: Trajectory | None) -> dict[str, float]:
+    """Return the errors of the times of events beside an exact solution."""
+    found = event_times(trajectory)
+    if not found or trajectory.result.status in SPENT:
+        return {}
+    end = reference.end_time
+    if all(np.all(np.abs(times - end) <= SQRT_EPS * times) for times in found.values()):  # the solution ends there
+        expected = {name: np.full(len(times), end) for name, times in found.items()}
+    else:  # exact solutions have no list of events
+        expected = event_times(second or _second_events(trajectory))
+    return event_errors(found, expected, trajectory.run.times[-1])
 
 
 def _off_events(trajectory: Trajectory, late: float) -> Mask:

@@ -53,7 +53,7 @@ order, 2e-16, and rounding 1e-12.
 
 
 @contextmanager
-def _in_range() -> Iterator[None]:
+def in_range() -> Iterator[None]:
     """Raise InputError for an arithmetic error, such as an overflow: the solution is for another scene."""
     try:
         yield
@@ -61,7 +61,7 @@ def _in_range() -> Iterator[None]:
         raise InputError("its formulas leave the range of numbers") from None
 
 
-@_in_range()
+@in_range()
 def exact_values(
     reference: Reference,
     scene: Scene,
@@ -147,7 +147,7 @@ def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Traj
         exact[name][at] = np.where(nearer, other, exact[name][at])
 
 
-@_in_range()
+@in_range()
 def match(name: str, options: Mapping[str, float], view: SceneView) -> Reference:
     """Return the named reference with the parameters of the scene, and ``options`` for those not in the scene.
 
