@@ -185,7 +185,7 @@ class Instant:
             if due is None:
                 self.limits = []
                 return point
-            jumped = self.apply(due, point)
+            jumped = self.apply(due, replace(point, ydot=seen.ydot))
             if jumped is None:
                 return None
             point = jumped

@@ -366,8 +366,48 @@ initial: {{g_n: -1 um}}
 run: {{until: 20 ms}}
 """)
     assert found.status == "finished"
-    assert [jump.edge.name for jump in found.trajectory.jumps][-1] == "slip forward"
+    assert found["slip"][-1] == 1.0
+    assert found["t_t"][-1] == pytest.approx(0.3 * float(found["p_contact"][-1]), rel=1e-10)
     assert found.accuracy.error < 1e-10
+
+
+PRESSED = {
+    "pressure": ({"p": [0.0, 1e6, 1e6, 0.0, 0.0, 0.0, 5e6]}, {}),
+    "given gap": ({"g_n": [0.0, -1e-6, -1e-6, 0.0, 1e-6, 0.0, -5e-6]}, {"penalty": {"E_n": 1e12}}),
+    "spring": ({"w_n": [0.0, -2e-6, -2e-6, 0.0, 1e-6, 0.0, -10e-6]}, {"penalty": {"E_n": 1e12}}),
+    "rigid": ({"w_n": [0.0, -1e-6, -1e-6, 0.0, 1e-6, 0.0, -5e-6]}, {}),
+}
+"""Loads by which the pressure falls to zero at 2 s, and grows by 1 MPa/s from 4 s on; the potential that bears them."""
+
+
+@pytest.mark.parametrize(("rate", "side"), [(1e-4, 1), (4.2e-4, -1), (7e-4, 1)])
+@pytest.mark.parametrize("stiffness", [{}, {"tangential-stiffness": {"E_t": 3e9}}], ids=["stiff", "elastic"])
+@pytest.mark.parametrize("by", PRESSED)
+def test_a_contact_closes_on_a_drive_that_has_reversed_in_the_air(by, stiffness, rate, side):
+    """It slides on with the drive, by sliding friction, if that grows slower than the pull; else it sticks.
+
+    The pull grows slower than what sticking bears, but for the fastest drive.
+    """
+    (load,), potentials = PRESSED[by][0].items(), PRESSED[by][1] | stiffness
+    k = 1e9 if not stiffness else 1 / (1 / 1e9 + 1 / 3e9)
+    rate = rate * 1e9 / k
+    drive = {"times": [0.0, 3.0, 9.0], "values": [0.0, side * 3e-3, side * (3e-3 - 6 * rate)]}
+    loads = {load[0]: {"table": {"times": [0.0, 0.1, 1.0, 2.0, 3.0, 4.0, 9.0], "values": load[1]}}}
+    case = {
+        "bodies": {"slider": {"temperature": 300}, "base": {"temperature": 300}},
+        "interface": {
+            "potential": [{name: values} for name, values in potentials.items()],
+            "friction": [{"coulomb": {"mu": 0.3, "mu_s": 0.5}}],
+        },
+        "mechanics": {"tangential": {"k": 1e9}} | ({"normal": {"k": 1e12}} if load[0] == "w_n" else {}),
+        "loading": {"w_t": {"table": drive}} | loads,
+        "run": {"until": 9.0},
+    }
+    found = surfacechem.run(case)
+    assert found.status == "finished"
+    pull = min(k * rate, 0.3e6)
+    late = np.asarray(found.dataset.time) > 4.01
+    np.testing.assert_allclose(found["t_t"][late], -side * pull * (found.dataset.time[late] - 4.0), rtol=1e-8)
 
 
 def test_an_elastic_slip_is_at_rest_where_the_bodies_have_come_apart():

@@ -147,7 +147,7 @@ def test_what_has_turned_in_the_air_slides_on_as_a_rigid_contact_closes():
     drive = Table(times=[0.0, 0.2, 3.0], values=[0.0, 4e-6, -52e-6])
     mounts = {"normal": Mounting(k=1e10), "tangential": Mounting(k=1e10)}
     trajectory = solve(together([], [Coulomb(mu=0.8)], {"w_n": wall, "w_t": drive}, **mounts), 3.0, outputs=61)
-    assert trajectory.events == ["slip forward", "touch", "stop", "slip backward"]
+    assert trajectory.events == ["slip forward", "touch", "stop"]
     times = trajectory.result.times
     pressing = np.maximum(-np.interp(times, wall.times, wall.values), 0.0)
     exact = np.interp(times, drive.times, drive.values) + 0.8 * pressing

@@ -38,7 +38,7 @@ from surfacechem.model.constraints import plane
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.system import STABLE_PREFIX, Margin
 from surfacechem.quantities import VARIABLES
-from surfacechem.tolerances import PICOMETRE, TINY, TRACTION_EPS
+from surfacechem.tolerances import PICOMETRE, TIME_EPS, TINY, TRACTION_EPS
 
 SLIP_WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
 
@@ -206,20 +206,33 @@ def _friction(
         slack = TRACTION_EPS * (size + absolute(t_f) + beside)
     limit = _limit(build, kind)
     back = {s: build.expanded(s * still + slack).subs({SLIP: s}) for s in (1, -1)}
+    # Without inertia the traction is at its limit as slip stops, and roundoff must not restart it.
+    onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else ZERO
     follows = not (kind.slides_inertially or kind.rate_dependent)
     if follows:
         # While the limit is zero and does not grow, both slip directions are equivalent, and slip does not end, not
         # even at rest: the constant keeps the guard off zero and is below any speed.
         grows = build.total_derivative(limit)
         back = {s: where(limit > 0, at, where(grows > 0, at, absolute(at) + PICOMETRE)) for s, at in back.items()}
+        # As a limit of zero begins to grow, slip goes on in the direction of the drive. With the growth of friction it
+        # would be as much faster than free slip in one direction as it is slower in the other.
+        other = 2 * free_velocity(build, kind) - v
+        onward = where(limit > TIME_EPS * build.t * grows, 0, where(SLIP * other < 0, -SLIP, 0))
     # Beyond touch a contact law may go on to negative pressure; there slip needs a pull to begin.
     reserves = {s: where(limit > 0, limit, 0) - s * needed for s in (1, -1)}
-    # Without inertia the traction is at its limit as slip stops, and roundoff must not restart it.
-    onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else ZERO
     breaks, end = breaks_bonds(build), dict.fromkeys(stops, ZERO)
     # Rate-independent slip finds its equilibrium at once; in other cases only lost bonds and their heat require one.
     equilibrates = bool(breaks) or follows
     return set_valued(reserves, back, {}, {SLIP: onward}, breaks, end, equilibrates=equilibrates, rests=follows)
+
+
+def free_velocity(build: Build, kind: Formulation) -> Expression:
+    """Return the velocity at which rate-independent slip follows its drive without friction [m/s]."""
+    u, rate = symengine.Symbol(kind.d.displacement), build.motion.gap_rates[kind.d.displacement]
+    if kind.mount is None or not kind.mount.quasi_static:
+        return rate
+    pull = build.expanded(far_field(build, kind.mount).force(u, ZERO) - derivative(build.psi, u))
+    return -build.total_derivative(pull).subs({symengine.Symbol(f"d{u}_dt"): ZERO}) / derivative(pull, u)
 
 
 def _limit(build: Build, kind: Formulation) -> Expression:

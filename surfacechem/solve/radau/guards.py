@@ -318,9 +318,10 @@ def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
     if value_high * side > 0.0:
         # The margin only touches zero there.
         return high
-    kept = 0
+    # A jump just behind the start of an arc is at the start, as far as the time of the run tells.
+    kept, least = 0, EPS * (w.elapsed + w.arc_start) / h
     for iteration in range(100):
-        if high - low <= NEWTON_EPS * high or value_high == 0.0:
+        if high <= least or high - low <= NEWTON_EPS * high or value_high == 0.0:
             break
         x = low + (high - low) * (value_low / (value_low - value_high))
         # Bisect every eighth time: near a multiple zero the secants converge slowly.
