@@ -110,6 +110,8 @@ class Lanes:
     """For implicit steps: rates of the states alone."""
     slopes: "LaneFunction | None" = None
     """For implicit steps: derivatives of these rates by the states, row-major."""
+    divisors: tuple[bool, ...] = ()
+    """For explicit steps, where the rates have no narrow features: a flag for each state, true if they divide by it."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +192,7 @@ class Program:
         """Tables of a program for the stepper: its sizes (states, accounts, margins, inputs; in the core, chains, cells
         of chains; zeros for edges); a row (code, user data) for residual, jacobian, ledger, margins and rates, zero
         where absent; a mask of the algebraic states; a row (first, end, anchor) for each chain; the positions of the
-        computed derivatives; the group of each quadrature, -1 if it is in none.
+        computed derivatives; the group of each quadrature, -1 if it is in none; none of the flags of lanes.
         """
         core = self.chains[0].first if self.chains else self.n
         sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core, 0, 0, 0
@@ -198,7 +200,8 @@ class Program:
         code = [(f.address, f.user) if f else (0, 0) for f in functions]
         chains = np.array([(c.first, c.end, c.anchor) for c in self.chains], np.int64).reshape(-1, 3)
         groups = np.array(self.groups or (-1,) * self.n_ledger, np.int64)
-        return np.array(sizes, np.int64), np.array(code, np.int64), self.algebraic_mask, chains, self.nonzeros, groups
+        arrays = np.array(sizes, np.int64), np.array(code, np.int64), self.algebraic_mask, chains, self.nonzeros
+        return *arrays, groups, np.zeros(0, np.bool_)
 
     @cached_property
     def rates(self) -> Function | None:
@@ -223,13 +226,15 @@ class Program:
 
     def lane_tables(self, lanes: Lanes) -> tuple[NDArray[Any], ...]:
         """Return the tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs
-        with constants, integrated columns); otherwise as the other tables, with a row for the constants.
+        with constants, integrated columns); otherwise as the other tables, with a row for the constants, and with the
+        divisors.
         """
         n_inputs = self.n_inputs + lanes.constants.n_out
         sizes = self.n, self.n_ledger, self.n_margins, n_inputs, self.n + self.n_ledger
         functions = lanes.states, lanes.slopes, None, lanes.margins, lanes.rates, lanes.constants
         code = [(f.address if f else 0, 0) for f in functions]
-        return np.array(sizes, np.int64), np.array(code, np.int64), *self.tables[2:]
+        own = np.array(sizes, np.int64), np.array(code, np.int64)
+        return *own, *self.tables[2:-1], np.array(lanes.divisors, np.bool_)
 
     @cached_property
     def explicit_tables(self) -> tuple[NDArray[Any], ...]:
@@ -634,7 +639,7 @@ def _compiled_lanes(
     """Return the code for eight cases at once; None if the equations do not give their rates explicitly, or are too
     many for implicit steps.
     """
-    from surfacechem.compile.vectors import compile_lanes, constants_apart
+    from surfacechem.compile.vectors import compile_lanes, constants_apart, divisors
 
     many = implicit and len(derivatives) > MOST_LANE_STATES
     rates = None if chains or many else solved_rates(expanded(named, residual), derivatives)
@@ -653,6 +658,7 @@ def _compiled_lanes(
         return Lanes(
             constants=compile_lanes(inputs, list(constants.values())),
             **{name: compile_lanes(given, part) for name, part in parts.items()},
+            divisors=() if implicit else divisors([*rates, *ledger], inputs[0], states),
         )
     except NotImplementedError:  # a function without vector code
         return None

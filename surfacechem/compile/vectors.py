@@ -9,6 +9,7 @@ of them.
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -98,6 +99,43 @@ def constants_apart(expressions: Sequence[Any], constants: Iterable[Any]) -> tup
             parts.known[part] = parts.replaced(part)
     found = [parts.with_symbols(expression) for expression in expressions]
     return {symbol: part for part, symbol in parts.symbols.items()}, found
+
+
+MOST_DEGREE = 4
+"""Degree up to which a polynomial of states counts as smooth. Over a step states are polynomials of degree 7 of the
+time, so that it is one of degree 28 at most, without features narrower than the distance of the stages.
+"""
+
+
+def divisors(expressions: Sequence[Any], t: Any, states: Sequence[Any]) -> tuple[bool, ...]:
+    """Return a flag for each state, true if expressions divide by it; nothing if one may have narrow features, because
+    it is anything else than a sum of products of a few states and times, their powers, and inverses of states.
+
+    >>> p, t, x, y = symengine.symbols("p t x y")
+    >>> divisors([symengine.exp(p) * (t - x) ** 2 / y, x], t, [x, y])
+    (False, True)
+    >>> [divisors([each], t, [x, y]) for each in (1 / (1 - x), x**5, symengine.exp(x), 1 / t)]
+    [(), (), (), ()]
+    """
+    degrees: dict[Any, float] = {}
+    divided = set()
+    for expression in expressions:
+        for part in _arguments_first(expression, lambda each: each.args, degrees):
+            kind, own = type(part).__name__, [degrees[each] for each in part.args]
+            if not any(own):
+                degrees[part] = float(part == t or part in states)
+            elif kind == "Add":
+                degrees[part] = max(own)
+            elif kind == "Mul":
+                degrees[part] = sum(own)
+            elif kind == "Pow" and part.args[1].is_Integer and (int(part.args[1]) > 0 or part.args[0] in states):
+                degrees[part] = own[0] * abs(int(part.args[1]))
+                divided |= {part.args[0]} if int(part.args[1]) < 0 else set()
+            else:
+                degrees[part] = math.inf
+        if degrees[expression] > MOST_DEGREE:
+            return ()
+    return tuple(state in divided for state in states)
 
 
 class _Parts:

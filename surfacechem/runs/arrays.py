@@ -164,8 +164,9 @@ class ArrayRuns:
         every = self.keeps_extremes or bool(keep.series)
         self.keeps_course = every or keep.balances
         """True if more is kept than ends and events."""
-        self.shape = self.problem.times if every else self.problem.times[[0, -1]]
-        """Output times of a run of the case."""
+        course = self.problem.times if every else self.problem.times[[0, -1]]
+        self.shape = course if self.keeps_course else course[:0]
+        """Output times of a run of the case; none if nothing is kept of them."""
 
     def _first_problem(self, changes: Mapping[str, float]) -> Problem:
         """Return the problem of the first admissible run; InputError if none of the first FIRST_RUNS is admissible."""
@@ -271,7 +272,7 @@ class ArrayRuns:
         # A load that does not move gives an infinite end, and such runs are left to be refused one by one.
         with np.errstate(all="ignore"):
             ends = (self.plan.until[1] - value) / slope
-        return ends, np.asarray(self.shape / self.shape[-1]) * ends[:, None]
+        return ends, np.asarray(self.shape / self.problem.times[-1]) * ends[:, None]
 
     def guards(self, rows: Array) -> tuple[Array, Mask]:
         """Return largest accounts and guards before the start, as a first arc has them, and the mask of runs without an
@@ -307,7 +308,7 @@ class ArrayRuns:
         batch, counts = found.batch, found.batch.counts
         status, reason, clear = self._verdicts(found)
         # A run that overflows its tables, or ends before its first output, is solved by itself.
-        clear &= (counts[:, EVENTS] <= batch.events.shape[1]) & (counts[:, OUTPUTS] > 0)
+        clear &= (counts[:, EVENTS] <= batch.events.shape[1]) & ((counts[:, OUTPUTS] > 0) | (not self.keeps_course))
         clear &= (counts[:, RECORDS] <= batch.records.shape[1]) | (not self.keeps_steps)
         columns: Columns = {
             "status": status,

@@ -118,7 +118,7 @@ class ChunkRuns:
         system = self.model.system
         if self.arrays is None:
             return 2**6
-        points = len(self.arrays.shape) + (100 if self.arrays.keeps_steps else 0)
+        points = max(len(self.arrays.shape), 1) + (100 if self.arrays.keeps_steps else 0)
         row = 8 * points * (4 * len(system.inputs) + 4 * len(system.outputs) + len(system.ledger))
         return int(np.clip(CHUNK_BYTES // (2 * row), 2**6, RUNS_OF_A_PIECE))
 

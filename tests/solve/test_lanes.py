@@ -230,6 +230,19 @@ def test_company_order_and_what_is_left_in_the_memory_change_nothing(name, impli
             assert np.array_equal(part.outputs[i, :reached], whole.outputs[some[i], :reached])
 
 
+def test_a_quotient_of_a_few_states_is_looked_at_only_where_its_divisor_changes(left):
+    """The inverse of a state that nearly falls to zero is a brief peak, although no equation has a narrow feature."""
+    t, (x, y, dx, dy) = se.Symbol("t"), se.symbols("x y dx dy")
+    width = 3e-3
+    program = compile_program(t, [x, y], [dx, dy], [], [dx - 2 * (t - 0.37), dy - width**8 / x**4])
+    assert program.lanes.divisors == (True, False)
+    shared = problem(program, [0.37**2 + width**2, 0.0], [0.0, 1.0], 1e-6, explicit=True, spacing=1 / 256)
+    columns = [shared.y0[None], np.zeros((1, 1, 0)), np.array([shared.spacing]), np.zeros((1, 0))]
+    found = lane_batch.solve_batch(shared, *columns, shared.segments[None], np.zeros((1, 0)))
+    assert left[0] == 0
+    assert found.ends[0, 2] == pytest.approx(width * 5 * np.pi / 16, rel=1e-5)
+
+
 @pytest.mark.parametrize("implicit", [False, True])
 @pytest.mark.parametrize("seed", every(4, range(80)))
 def test_what_is_narrow_is_seen(seed, implicit, left):
