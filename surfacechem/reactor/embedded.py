@@ -6,7 +6,7 @@ Its recorded history becomes a solution like that of a run.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -30,7 +30,7 @@ from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import Instant
 from surfacechem.solve.jumps import Jump
 from surfacechem.solve.run import Model, Run, Trajectory
-from surfacechem.tolerances import DEFAULT_RTOL, SQRT_EPS, TINY
+from surfacechem.tolerances import DEFAULT_RTOL, NEGLIGIBLE, SQRT_EPS, TINY
 
 NO_END = 1e300
 """End of the last load segment [s]."""
@@ -39,6 +39,13 @@ NONE: Mapping[str, Callable[[float], float]] = {}
 
 GLOBAL_ERROR = 100
 """Ratio by which the error of a state may exceed the tolerance of a step."""
+
+NEARBY, SPARE_SAMPLES = 0.1, 8
+"""Largest relative change of random states, a choice, and samples beside two for each state: what is no fixed
+combination of rates would be one at all of them by chance only."""
+
+ROUNDED_COMBINATION = NEGLIGIBLE * SQRT_EPS
+"""Part of a rate that a fixed combination of others may leave: roundoff leaves less, and what is curved leaves more."""
 
 DIFFERENCE_STEPS = 8 * SQRT_EPS
 """A few of the finite-difference steps of Cantera's integrator, which bounds must tolerate."""
@@ -259,6 +266,11 @@ class EmbeddedScene:
 
     def put(self, t: float, x: Array) -> bool:
         """Set time, variables and the loads of that time; return whether a consistent state was found."""
+        self.set_loads(t)
+        return self.evaluation.put(t, x[: len(self.states)])
+
+    def set_loads(self, t: float) -> None:
+        """Set the loads of a time; each is asked for its value."""
         if self._asks:
             raise InputError("a load asks for what follows from the loads. Let it read states only.")
         self._asks = True
@@ -267,7 +279,6 @@ class EmbeddedScene:
                 self.evaluation.parameters[self.places[path]] = float(function(t))
         finally:
             self._asks = False
-        return self.evaluation.put(t, x[: len(self.states)])
 
     def rates(self, t: float, x: Array) -> Array:
         """Return the time derivatives of the variables; EndError if there are none, or if a limit is passed."""
@@ -335,18 +346,47 @@ class EmbeddedScene:
         self.put(t, x)
         return self.events.margins()
 
-    def rates_inside(self, t: float, x: Array) -> Array:
-        """Return the time derivatives of the variables inside a step, whatever limits are passed there."""
-        self.put(t, x)
-        return self.evaluation.rates()
-
-    def many_rates(self, times: Array, x: Array) -> Array:
-        """Return the time derivatives of the variables at several times, a row each, at the present parameters."""
-        evaluation = self.evaluation
-        y = np.repeat(evaluation.y[None], len(times), axis=0)  # algebraic variables are searched from the last ones
+    def many_rates(self, times: Array, x: Array, parameters: Array) -> Array:
+        """Return the time derivatives of the variables at several times, a row each; so may be the parameters."""
+        evaluation, y = self.evaluation, np.empty((len(times), self.problem.program.n))
+        y[:] = evaluation.y  # algebraic variables are searched from the last ones
         y[:, evaluation.free] = x[:, : len(self.states)]
-        _, ydot, ledger, _ = Evaluations(evaluation.program, evaluation.parameters)(times, y)
+        _, ydot, ledger, _ = self._evaluations(times, y, parameters)
         return np.hstack((ydot[:, evaluation.free], ledger))
+
+    @cached_property
+    def _evaluations(self) -> Evaluations:
+        return Evaluations(self.problem.program, self.evaluation.parameters)
+
+    def combined(self, t: float, x: Array, given: Sequence[int]) -> Array:
+        """Return how the accounts follow from the states: [state, account], zero for those that do not.
+
+        The rates of some are fixed combinations of those of the states, such as of bonds or, with constant heat
+        capacities, of heat. That shows in the rates at random states about the present ones, times before the next
+        breakpoint and parameters ``given`` by the network.
+        """
+        count, random = len(self.states), np.random.default_rng(0)
+        samples = 2 * count + SPARE_SAMPLES
+        scales = np.array([state.finest or state.scale for state in self.model.system.states])[self.evaluation.free]
+        about = x[:count] + NEARBY * random.random((samples, count)) * np.maximum(np.abs(x[:count]), scales)
+        following = min((b for b in self.breakpoints if b > t), default=np.inf)
+        times = t + random.random(samples) * min(following - t, 1.0)
+        parameters = np.repeat(self.evaluation.parameters[None], samples, axis=0)
+        changes = NEARBY * random.random((samples, len(given)))
+        parameters[:, given] += changes * np.where(parameters[0, given] != 0, np.abs(parameters[0, given]), 1.0)
+        rates = self.many_rates(times, about, parameters)
+        rates = rates[np.isfinite(rates).all(axis=1)]
+        if len(rates) < count + SPARE_SAMPLES:
+            return np.zeros((count, rates.shape[1] - count))
+        largest = np.abs(rates).max(axis=0)
+        sizes = np.where(largest > TINY, largest, 1.0)
+        states, accounts = np.split(rates / sizes, [count], axis=1)
+        # States that follow from others, such as the last coverage, would share their part, with their roundoff.
+        states[:, np.abs(np.diag(np.linalg.qr(states).R)) < ROUNDED_COMBINATION] = 0.0
+        found = np.linalg.lstsq(states, accounts)[0]
+        rest = np.abs(states @ found - accounts).max(axis=0)
+        found[np.abs(found) < ROUNDED_COMBINATION] = 0.0
+        return np.where(rest < ROUNDED_COMBINATION, found * sizes[count:] / sizes[:count, None], 0.0)
 
     def moved(self, t: float, x: Array, index: int | None) -> tuple[Array, Array]:
         """Return the variables after a transition, or after the due ones if None, and the additions to the ledger.

@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surfacechem import format as cases
 from surfacechem.contracts.terms import Spec
@@ -112,8 +114,6 @@ class InterfaceReactor(StateVectorReactor):
         self._is_set, self._asked_at = False, 0.0
         """Whether variables were set since other reactors asked for rates, and the time of that request [s]."""
         self.evaluations, self.seconds = 0, 0.0
-        self.integrated = False
-        """True if a network integrates the ledger itself, instead of the integrator."""
         self._set_scene(self.scene)
         for body, reactor in self.bodies.items():
             self._connect(reactor, body)
@@ -144,7 +144,8 @@ class InterfaceReactor(StateVectorReactor):
         self.unit = np.array([1.0] * len(scene.states) + [LEDGER_UNIT] * len(scene.accounts))
         self.x = scene.start()
         self.ledger = self.x[len(scene.states) :].copy()
-        """The ledger of a scene with jumps, which the network integrates separately."""
+        self.booked_at = self.x
+        """Variables up to which the network has integrated the ledger."""
         self.reason = ""
         self._last: tuple[float, Array, Array] | None = None
         """Time, variables and rates of the last evaluation."""
@@ -453,11 +454,37 @@ class InterfaceReactor(StateVectorReactor):
                 "surfacechem.reactor.ReactorNet."
             )
 
-    def rates_inside(self, t: float) -> Array:
-        """Return the rates [SI per s] for the values set last, inside a step."""
-        self._last_inputs, self._current = None, False
+    def parameters_at(self, t: float) -> Array:
+        """Return the parameters of the scene at a time [s], from the present network."""
         self._read_network()
-        return self.scene.rates_inside(t, self.x)
+        self.scene.set_loads(t)
+        return self.scene.evaluation.parameters.copy()
+
+    def combined(self, t: float) -> Array:
+        """Return how its accounts follow from its states near the present ones: [state, account]."""
+        self.parameters_at(t)
+        loads = [self.scene.places[path] for path in self.scene.loads]
+        return self.scene.combined(t, self.x, [*self._input_columns, *loads])
+
+    @cached_property
+    def received(self) -> NDArray[np.bool_]:
+        """Mask of the accounts of what reactors in the place of a body, or next to the surface, receive."""
+        accounts = (*self.scene.states, *self.scene.accounts)
+        indices = [*self._accounts.values(), *chain(*(item.accounts for item in self.scene.neighbours))]
+        names = {accounts[i] for i in indices} | ({"H_neighbours"} if self.neighbours else set())
+        names |= {f"{name}_entropy" for name in names}  # carried by the same sum
+        return np.array([name in names for name in self.scene.accounts], dtype=bool)
+
+    def book(self, x: Array, gain: Array, combined: Array) -> None:
+        """Add to the ledger what it gains up to the variables ``x``, from the integrals of all rates.
+
+        Accounts that follow from the states change as these do, whose integrals differ by the error of a step. Those of
+        what another reactor receives change as the integrator's, lest anything is lost between the two.
+        """
+        count, change = len(self.scene.states), x - self.booked_at
+        gained = gain[count:] + (change - gain)[:count] @ combined
+        self.ledger = self.ledger + np.where(self.received, change[count:], gained)
+        self.booked_at = x
 
     def begin_segment(self, t: float, rtol: float) -> None:
         """Set the load segments that begin at time t [s], at a relative tolerance."""
@@ -469,7 +496,7 @@ class InterfaceReactor(StateVectorReactor):
         try:
             self.x, booked = self.scene.moved(t, self.x, index)
             self._refuse_sudden_heat(t)
-            self.ledger = self.ledger + booked
+            self.ledger, self.booked_at = self.ledger + booked, self.x
         except EndError as end:
             raise self._stopped(f"{end} at t = {t:.9g} s") from None
         self._last, self._last_inputs, self._current = None, None, False
@@ -528,10 +555,8 @@ class InterfaceReactor(StateVectorReactor):
         """
         self.t, self._dated = t, True
         self._read_network()
-        x = self.x
-        if self.integrated:
-            x = np.concatenate((x[: len(self.scene.states)], self.ledger))
-        self.history.append(t, x)
+        n = len(self.scene.states)
+        self.history.append(t, np.concatenate((self.x[:n], self.ledger + (self.x - self.booked_at)[n:])))
 
     @property
     def dataset(self) -> xarray.Dataset:

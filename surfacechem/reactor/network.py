@@ -20,9 +20,6 @@ from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing
 from surfacechem.solve.contract import Array, Counters, Guard
 
-CVODE_GROWTH = 1e4
-"""Largest ratio of successive steps of CVODE: after the first step this, later 10."""
-
 STEPS_OF_A_RESIDUAL = 10
 """Steps between two tests for a steady state, as in Cantera."""
 
@@ -55,8 +52,6 @@ class ReactorNet(cantera.ReactorNet):
 
     def __init__(self, reactors: Sequence[Any] = ()) -> None:
         self.interfaces: list[InterfaceReactor] = []
-        self._last_step = 0.0
-        self._steps = 0
         self._fresh = True
         self._started = -np.inf
         self._last_surroundings: list[object] = []
@@ -106,7 +101,7 @@ class ReactorNet(cantera.ReactorNet):
         while True:
             goal = min([t, *self._breakpoints()])
             with self._guarded():
-                if self._watch.interfaces:
+                if self.interfaces:
                     self._reach(goal, apply_limit)
                 elif not self._is_reached(goal):
                     super().advance(goal, apply_limit)
@@ -117,23 +112,26 @@ class ReactorNet(cantera.ReactorNet):
     def _reach(self, goal: float, apply_limit: bool) -> None:
         """Advance to a time, through the events of scenes before it."""
         watch = self._watch
-        for interface in watch.interfaces:
+        for interface in self.interfaces:
             if interface.scene.events:
                 interface.scene.events.until(goal, self.rtol)
         start = np.array(self.get_state()) if apply_limit and np.any(self.advance_limits >= 0) else None
-        while not self._is_reached(goal):
-            if self.time >= watch.known:
-                self._locate_event(goal)
-            event, now = watch.event, float(self.time)
-            end = min(goal, watch.known if event is None else max(event.t, now))
-            reached = end if start is None else self._limited(now, end, start)
-            watch.integrate_ledgers(reached)
-            super().advance(reached, False)
-            if reached < end:
-                return
-            if event is not None and self.time >= event.t:
-                event.interface.jump(self.time, event.index)
-                self._restart(f"the event at t = {self.time:g} s")
+        try:
+            while not self._is_reached(goal):
+                if self.time >= watch.known:
+                    self._locate_event(goal)
+                event, now = watch.event, float(self.time)
+                end = min(goal, watch.known if event is None else max(event.t, now))
+                reached = end if start is None else self._limited(now, end, start)
+                watch.follow(reached)
+                if reached < end:
+                    return
+                if event is not None and self.time >= event.t:
+                    watch.book()
+                    event.interface.jump(self.time, event.index)
+                    self._restart(f"the event at t = {self.time:g} s")
+        finally:
+            watch.book()
 
     def _is_reached(self, goal: float) -> bool:
         """True if a time is reached.
@@ -166,13 +164,12 @@ class ReactorNet(cantera.ReactorNet):
         """Make the integrator take a step, advance a little into it, and locate its first event."""
         super().advance(self._watch.ahead(goal), False)
         self._watch.locate_event()
-        super().advance(self.time, False)
 
     def _restart(self, where: str) -> None:
         """Restart the integration from the present state."""
         if self.n_sensitivity_params:
             raise InputError(f"sensitivities end at {where}, where the integration starts anew.")
-        for interface in self._watch.interfaces:
+        for interface in self.interfaces:
             if interface.scene.events:
                 interface.jump(self.time)
             self._record(interface, self.time)
@@ -188,7 +185,7 @@ class ReactorNet(cantera.ReactorNet):
             self._watch.restart()
             for interface in self.interfaces:
                 interface.restarted = self.time
-            self._steps, self._started = 0, self.time
+            self._started = self.time
 
     def step(self) -> float:
         """Take one step of the integrator, or go to the next breakpoint if a step could pass it.
@@ -204,17 +201,9 @@ class ReactorNet(cantera.ReactorNet):
             Where a scene ends, with the reason.
         """
         self._begin_or_restart()
-        following = self._breakpoints()
-        if self._watch.interfaces:
-            return self._watched_step(following)
-        growth = CVODE_GROWTH if self._steps < 2 else 10.0
-        if following and (self._steps == 0 or self.time + growth * self._last_step >= following[0]):
-            return self._advance(following[0])
-        before = self.time
-        with self._guarded():
-            super().step()
-        self._steps += 1
-        self._last_step = self.time - before
+        if self.interfaces:
+            return self._watched_step(self._breakpoints())
+        super().step()
         self._arrive(self.time)
         return float(self.time)
 
@@ -314,7 +303,7 @@ class ReactorNet(cantera.ReactorNet):
             if interface.scene.events:
                 interface.jump(self.time)
             interface.record(self.time)
-        if self._watch.interfaces:
+        if self.interfaces:
             self.reinitialize()
 
     def _refuse_strangers(self) -> None:

@@ -13,13 +13,14 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
+import cantera
 import numpy as np
 
 from surfacechem.reactor.interface_reactor import InterfaceReactor
 from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_step
 from surfacechem.solve.adapters.dense_step import DenseStep, Guards, first_crossing
 from surfacechem.solve.contract import Array, Guard
-from surfacechem.tolerances import NEGLIGIBLE, TINY
+from surfacechem.tolerances import NEGLIGIBLE
 
 FIRST_AHEAD = NEGLIGIBLE**3
 """Time of the first request after a start, as a fraction of the integration; first steps are shorter."""
@@ -44,13 +45,12 @@ LESS_GAUSS = WEIGHTS - np.insert(_GAUSS[1], [0, 1, 2, 3], 0.0)
 PANELS_PER_CYCLE = 8
 """Panels in a cycle of a load from which halving begins, a choice: two coarser panels could agree by aliasing."""
 
+MOST_PANELS = 64
+"""Panels at once, a choice: a call for so many costs little more than for one."""
+
 MOST_HALVINGS = 8
 """Halvings of a panel, a choice: accounts that are roundoff never agree, and 256 panels resolve what a step passes over
 smoothly."""
-
-EXPLAINED = 10.0
-"""Ratio of the relative errors of an account and of a state up to which the same is their cause, a choice: between 10
-and 100 the errors of balances stay the same."""
 
 
 @dataclass(frozen=True)
@@ -62,26 +62,45 @@ class InterfaceEvent:
     index: int
 
 
+@dataclass(frozen=True)
+class StepPanel:
+    """A part of a step of the integrator, with all that rates at the nodes of its quadrature depend on."""
+
+    step: DenseStep
+    low: float
+    """Its first time [s]."""
+    length: float
+    """Its length [s]."""
+    times: Array
+    """Times of its nodes [s]."""
+    rows: Array
+    """Variables of the network there, a row each."""
+    parameters: list[list[Array]]
+    """Parameters of each interface there, none if they are the present ones."""
+
+
 class StepWatcher:
     """Events of interfaces and their ledgers, along the dense output of the last step of the integrator."""
 
     def __init__(self, net: Any, interfaces: Sequence[InterfaceReactor]) -> None:
         self.net = net
-        # Scenes that jump, and those whose ledgers are integrated here. Others keep the integrator's speed.
-        ours = all(isinstance(reactor, StateVectorReactor) for reactor in net.reactors)
-        self._counted_here = [item for item in interfaces if _is_counted_here(item, ours)]
-        """Interfaces whose ledgers are integrated here, not by the integrator."""
-        for item in self._counted_here:
-            item.integrated = True
-        self.interfaces = [item for item in interfaces if item.scene.events or item.integrated]
-        self._is_coupled = any(item.coupled for item in self.interfaces)
-        self._varies = any(item.scene.varies or item.loads for item in self._counted_here)
+        self.interfaces = list(interfaces)
+        self._is_coupled = any(item.coupled for item in interfaces)
+        self._is_ours = all(isinstance(reactor, StateVectorReactor) for reactor in net.reactors)
+        """True if all reactors can be set from Python to any time of a step, forth and back; others only forth."""
+        self._halves = self._is_ours or not self._is_coupled
+        self._combined: list[Array] = []
+        """How the accounts of each interface follow from its states."""
         self.started = False
         self.known = -np.inf
         """Time up to which the next event is known [s]."""
         self.event: InterfaceEvent | None = None
         self._end = -np.inf
-        """Time up to which the ledgers are integrated [s]."""
+        """Time up to which there are panels [s]."""
+        self._panels: list[StepPanel] = []
+        """Panels along which the ledgers are not integrated yet."""
+        self._reached: list[Array] = []
+        """Variables of the interfaces at the end of them."""
         self._before: list[Array] = []
         self._step: DenseStep | None = None
 
@@ -95,6 +114,7 @@ class StepWatcher:
         """Restart, as the integrator does."""
         self.started, self.known, self.event = False, -np.inf, None
         self._end = float(self.net.time)
+        self._combined = [item.combined(self._end) for item in self.interfaces]
 
     def ahead(self, goal: float) -> float:
         """Return a time [s] at which a request makes the integrator take one step."""
@@ -106,7 +126,7 @@ class StepWatcher:
         return min(goal, now + max(min(FIRST_AHEAD * (goal - now), soonest / 2), MIN_AHEAD * float(np.spacing(now))))
 
     def locate_event(self) -> None:
-        """Locate the first event in the step that the integrator has just taken; it may displace the reactors."""
+        """Locate the first event in the step that the integrator has just taken."""
         now = float(self.net.time)
         self.started, self.event = True, None
         self.known = max([now, *(item.asked for item in self.interfaces)])
@@ -123,92 +143,95 @@ class StepWatcher:
                 t, fired = first_crossing(step, guards, np.isfinite(present), 0.0)
             if fired and (self.event is None or t < self.event.t):
                 self.event = InterfaceEvent(t, item, fired[0])
+        if self._is_coupled:
+            self.go(now)
 
     def _guards_of(self, item: InterfaceReactor) -> Callable[[float, Array], Array]:
         """Return the guards of an interface as a function of time and the variables of the network."""
 
         def guards(t: float, y: Array) -> Array:
-            if self._is_coupled:
-                self._put(y)
+            if self._is_coupled and self._is_ours:
+                self._put(t, y)
             return item.scene.transitions(t, y[self._columns[item]] * item.unit)
 
         return guards
 
-    def _put(self, y: Array) -> None:
-        """Set the reactors of this package to the variables of a network."""
+    def _put(self, t: float, y: Array) -> None:
+        """Set the reactors to a time and the variables of the network then."""
+        if not self._is_ours:
+            self.go(max(t, float(self.net.time)))  # the first request after a start has passed a little of the step
+            return
         for reactor, columns in self._columns.items():
-            if isinstance(reactor, StateVectorReactor):
-                reactor.put(y[columns])
+            reactor.put(y[columns])
 
-    def integrate_ledgers(self, end: float) -> None:
-        """Integrate the ledgers up to a time in the step; it may displace the reactors.
+    def go(self, t: float) -> None:
+        """Let the integrator set all reactors to a time that is not before the last one."""
+        cantera.ReactorNet.advance(self.net, t, False)
+
+    def follow(self, end: float) -> None:
+        """Go to a time in the step, and keep the panels on the way there."""
+        start, self._end = self._end, end
+        if end > start:
+            assert self._step is not None
+            cycles = [item.scene.values[path] for item in self.interfaces for path in item.scene.model.system.cycles]
+            count = 1 + int(PANELS_PER_CYCLE * max(cycles, default=0.0) * (end - start))
+            length = (end - start) / count
+            self._panels += [self._panel(self._step, start + k * length, length) for k in range(count)]
+        self.go(end)
+        self._reached = [item.x for item in self.interfaces]
+        if len(self._panels) >= MOST_PANELS:
+            self.book()
+
+    def book(self) -> None:
+        """Integrate the ledgers along the panels kept so far.
 
         The integrator may step over their changes while nothing else moves, so panels are halved where anything varies.
         """
-        start, self._end = self._end, end
-        if not self._counted_here or not end > start:
-            return
-        assert self._step is not None
-        cycles = [item.scene.values[path] for item in self._counted_here for path in item.scene.model.system.cycles]
-        panels = 1 + int(PANELS_PER_CYCLE * max(cycles, default=0.0) * (end - start))
-        length = (end - start) / panels
-        gain = np.sum([self._integral(start + k * length, length, MOST_HALVINGS) for k in range(panels)], axis=0)
-        ends, first = self._step.rows(np.array([start, end])), 0
-        for item in self._counted_here:
-            own, size = gain[:, first : first + len(item.x)]
-            item.ledger = item.ledger + self._gained(item, own, size, ends[:, self._columns[item]] * item.unit)
-            first += len(item.x)
+        if self._panels:
+            panels, self._panels = self._panels, []
+            gain = self._integral(panels, MOST_HALVINGS)
+            for item, x, combined in zip(self.interfaces, self._reached, self._combined, strict=True):
+                item.book(x, gain[: len(x)], combined)
+                gain = gain[len(x) :]
+            if self._halves and self._is_coupled:
+                self.go(float(self.net.time))
 
-    def _gained(self, item: InterfaceReactor, gain: Array, size: Array, ends: Array) -> Array:
-        """Return the change of an interface's ledger, from the integrals of its rates and of their magnitudes, and from
-        its variables at both ends.
-
-        Reactions that run both ways fast magnify the error of a step in the integrals. The integrator's own sum has no
-        such error, and is what neighbours receive, but it may miss what happens while no state moves. So it is taken
-        where the difference is no larger than that of a state. Entropy production it does not resolve.
+    def _integral(self, panels: Sequence[StepPanel], left: int) -> Array:
+        """Return the integrals of all rates over panels, halved until two rules agree, relative to the amounts
+        exchanged and to the states.
         """
-        count, changes = len(item.scene.states), ends[1] - ends[0]
-        if not item.coupled:
-            return gain[count:]
-        missed, tolerances = np.abs(gain - changes), self.net.rtol * np.abs(ends).max(axis=0) + self.net.atol
-        parts = np.where(missed > NEGLIGIBLE * tolerances, missed, 0.0) / np.maximum(size, TINY)
-        explained = missed <= EXPLAINED * parts[:count].max(initial=0.0) * size
-        summed = ~item.scene.entropic & (explained[count:] | bool(item.neighbours))
-        return np.where(summed, changes[count:], gain[count:])
-
-    def _integral(self, low: float, length: float, left: int) -> Array:
-        """Return the integrals of all rates and of their magnitudes, from panels that are halved until two rules agree,
-        relative to the amounts exchanged and to the states.
-        """
-        rates = self._panel(low + length / 2 * (1 + NODES))
-        found = length / 2 * np.array([WEIGHTS @ rates, WEIGHTS @ np.abs(rates)])
-        if not left or not self._varies:
-            return found
+        rates = self._rates(panels)
+        halves = np.array([panel.length / 2 for panel in panels])[:, None]
+        found = halves * (WEIGHTS @ rates)
+        if not left or not self._halves:
+            return np.asarray(found.sum(axis=0))
         # Within a load segment rates are smooth along the dense output, so that halving converges fast.
-        known = np.concatenate([np.append(item.x[: -len(item.ledger)], item.ledger) for item in self._counted_here])
-        if np.all(length / 2 * np.abs(LESS_GAUSS @ rates) <= self.net.rtol * (found[1] + np.abs(known))):
-            return found
-        return self._integral(low, length / 2, left - 1) + self._integral(low + length / 2, length / 2, left - 1)
+        known = np.concatenate([np.append(item.x[: -len(item.ledger)], item.ledger) for item in self.interfaces])
+        allowed = self.net.rtol * (halves * (WEIGHTS @ np.abs(rates)) + np.abs(known))
+        agree = np.all(halves * np.abs(LESS_GAUSS @ rates) <= allowed, axis=1)
+        rough = [panel for panel, fine in zip(panels, agree, strict=True) if not fine]
+        parts = [self._panel(p.step, p.low + k * p.length / 2, p.length / 2) for p in rough for k in range(2)]
+        rest = self._integral(parts, left - 1) if parts else 0.0
+        return np.asarray(found[agree].sum(axis=0) + rest)
 
-    def _panel(self, times: Array) -> Array:
-        """Return the rates of all interfaces at times of the step, a row each."""
-        assert self._step is not None
-        rows = self._step.rows(times)
+    def _panel(self, step: DenseStep, low: float, length: float) -> StepPanel:
+        """Return a panel of a step with the parameters that each interface has at its nodes."""
+        times = low + length / 2 * (1 + NODES)
+        panel = StepPanel(step, low, length, times, step.rows(times), [[] for _ in self.interfaces])
         if self._is_coupled:
-            return np.array([self._rates(t, y) for t, y in zip(times.tolist(), rows, strict=True)])
-        parts = ((item, rows[:, self._columns[item]] * item.unit) for item in self._counted_here)
-        return np.hstack([item.scene.many_rates(times, part) for item, part in parts])
+            for t, y in zip(times.tolist(), panel.rows, strict=True):
+                self._put(t, y)
+                for item, parameters in zip(self.interfaces, panel.parameters, strict=True):
+                    parameters.append(item.parameters_at(t))
+        return panel
 
-    def _rates(self, t: float, y: Array) -> Array:
-        """Return the rates at a time and the variables of the network, from which interfaces take values."""
-        self._put(y)
-        return np.concatenate([item.rates_inside(t) for item in self._counted_here])
-
-
-def _is_counted_here(item: InterfaceReactor, ours: bool) -> bool:
-    """True if the ledger of an interface is integrated along the steps of a network.
-
-    ``ours`` is true if all reactors are set from Python, so that they can be at any time of a step. Those of Cantera
-    are at its end only.
-    """
-    return ours if item.coupled else bool(item.scene.events) or item.scene.varies
+    def _rates(self, panels: Sequence[StepPanel]) -> Array:
+        """Return the rates of all interfaces at the nodes of panels: [panel, node, rate]."""
+        times = np.concatenate([panel.times for panel in panels])
+        rows = np.concatenate([panel.rows for panel in panels])
+        found = []
+        for k, item in enumerate(self.interfaces):
+            given = [row for panel in panels for row in panel.parameters[k]]
+            parameters = np.array(given or item.scene.evaluation.parameters)
+            found.append(item.scene.many_rates(times, rows[:, self._columns[item]] * item.unit, parameters))
+        return np.hstack(found).reshape(len(panels), len(NODES), -1)

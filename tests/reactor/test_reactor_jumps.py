@@ -148,6 +148,26 @@ def test_beside_a_closed_chamber():
     assert float(solution.dataset["T_2"][-1]) > 300.1
 
 
+def test_accounts_beside_a_gas_are_those_beside_a_body():
+    """The first bonds produce entropy that the integrator's steps do not resolve; what the gas receives is its sum."""
+    chamber = ct.IdealGasReactor(ct.Solution(yaml=GAS), clone=True, volume=2.0)
+    body = {"temperature": "T_2", "C": chamber.mass * chamber.phase.cv_mass / 0.5, "capacity": "constant"}
+    changes = {"bodies.upper": body, "initial.T_2": "300 K", "run.until": "10 s", "run.rtol": 1e-12}
+    known = surfacechem.load("dna-adhesive", changes).run(error="balances").dataset
+    held = {"bodies.upper": {"temperature": "300 K"}, "initial.T_2": None}
+    interface = InterfaceReactor("dna-adhesive", held, area=0.5, bodies={"upper": chamber})
+    net = ReactorNet([chamber, interface])
+    net.rtol = 1e-9
+    before = chamber.mass * chamber.phase.int_energy_mass
+    net.advance(10.0)
+    data = interface.dataset
+    for account in ("entropy_R1", "heat_R1", "entropy_q_1c", "entropy_q_2c", "heat_into_1"):
+        assert float(data[account][-1]) == pytest.approx(float(known[account][-1]), rel=1e-5)
+    assert max(data.attrs[f"{kind}_error"] for kind in ("energy", "entropy", "site")) < 1e-6
+    gained = chamber.mass * chamber.phase.int_energy_mass - before
+    assert 0.5 * float(data["heat_into_2"][-1]) == pytest.approx(gained, rel=1e-5)
+
+
 def test_a_reactor_takes_no_heat_at_once():
     pulled = [
         "bodies.upper={temperature: 300 K, stiffness: 2e13 Pa/m}",

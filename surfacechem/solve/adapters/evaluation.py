@@ -112,16 +112,22 @@ class Evaluation:
 
 
 class Evaluations:
-    """Evaluation of a program at many states at once with the same parameters, in one reused buffer."""
+    """Evaluation of a program at many states at once, in one reused buffer."""
 
     def __init__(self, program: Program, parameters: Array) -> None:
         self.program = program
         self._inputs = np.concatenate((np.zeros(1 + 2 * program.n), parameters))[None]
 
-    def __call__(self, times: Array, y: Array) -> tuple[Array, Array, Array, Array]:
-        """Return consistent states and rates, NaN where none exist, rates of the ledger and margins, by time."""
+    def __call__(self, times: Array, y: Array, parameters: Array | None = None) -> tuple[Array, Array, Array, Array]:
+        """Return consistent states and rates, NaN where none exist, rates of the ledger and margins, by time.
+
+        ``parameters``, one row or one for each time, are those of this and of later calls.
+        """
         program, n = self.program, self.program.n
-        rows = program.filled(self._filled(times, y))
+        rows = self._filled(times, y)
+        if parameters is not None:
+            rows[:, 1 + 2 * n :] = parameters
+        rows = program.filled(rows)
         states, ydot = rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n]
         if program.rates is not None:
             ydot[:] = program.rates(rows)
