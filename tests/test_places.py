@@ -96,8 +96,8 @@ class EarlyBraking(Reference):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        force = scene.friction("mu") * scene.initial("p")
-        return {"v_i": scene.initial("v"), "a": force / scene.tangential("m")}
+        force = scene.read("friction", "mu") * scene.initial("p")
+        return {"v_i": scene.initial("v"), "a": force / scene.read("tangential", "m")}
 
     def quantities(self, t: Array) -> Quantities:
         return {"v": self.v_i - self.a * t, "u_t": self.v_i * t - self.a * t**2 / 2}

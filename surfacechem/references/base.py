@@ -33,6 +33,13 @@ if TYPE_CHECKING:
 __all__ = ["Array", "Parameters", "Quantities", "Reference", "SceneView", "read"]
 
 
+LAWS = {"potential": "potentials", "friction": "frictions", "reaction": "reactions", "limit": "limits"}
+"""Readings of the constants of laws, and the laws of the interface that have them."""
+
+PATHS = {"ramp": "loading.{}.ramp.rate", "normal": "mechanics.normal.{}", "tangential": "mechanics.tangential.{}"}
+"""Readings of rates at which variables are driven [per second], and of supports of the bodies, by their paths."""
+
+
 class SceneView:
     """A scene as it was run: constants of its laws by contract, loads, supports, capacities and initial values, in SI.
 
@@ -51,28 +58,18 @@ class SceneView:
         return dict(zip(self._system.output_columns, self.run.outputs[0].tolist(), strict=True))
 
     def read(self, reading: str, name: str) -> float | None:
-        """Return one of the readings below, by name if it needs one; a preceding minus reverses the sign."""
-        found = getattr(self, reading)
-        value: float | None = found(name.removeprefix("-")) if callable(found) else found
+        """Return one of the readings above or below, by name if it needs one; a preceding minus reverses the sign."""
+        own = name.removeprefix("-")
+        if reading in LAWS:
+            value = self._constant(getattr(self.scene.interface, LAWS[reading]), own)
+        elif reading in PATHS:
+            value = self.run.values.get(PATHS[reading].format(own))
+        else:
+            found = getattr(self, reading)
+            value = found(own) if callable(found) else found
         return -value if value is not None and name.startswith("-") else value
 
     # -- laws, loads, supports -----------------------------------------------------------------------------------------
-
-    def potential(self, name: str) -> float | None:
-        """Return a constant of the interface's potentials."""
-        return self._constant(self.scene.interface.potentials, name)
-
-    def friction(self, name: str) -> float | None:
-        """Return a constant of the friction laws."""
-        return self._constant(self.scene.interface.frictions, name)
-
-    def reaction(self, name: str) -> float | None:
-        """Return a constant of the rate laws."""
-        return self._constant(self.scene.interface.reactions, name)
-
-    def limit(self, name: str) -> float | None:
-        """Return a constant of the limits of traction."""
-        return self._constant(self.scene.interface.limits, name)
 
     def _constant(self, laws: Iterable[Law], name: str) -> float | None:
         """Return a constant of one of the laws, or of a factor of one of its parameters."""
@@ -98,18 +95,6 @@ class SceneView:
         if not isinstance(self.scene.surface, CurvedSurfaces):
             raise InputError("it needs two bodies with shapes; the scene has no `surface`.")
         return self.scene.surface
-
-    def ramp(self, name: str) -> float | None:
-        """Return the constant rate at which a variable is driven, in its unit per second."""
-        return self.run.values.get(f"loading.{name}.ramp.rate")
-
-    def normal(self, name: str) -> float | None:
-        """Return a constant of the support of the bodies along the normal."""
-        return self.run.values.get(f"mechanics.normal.{name}")
-
-    def tangential(self, name: str) -> float | None:
-        """Return a constant of the support of the bodies along the interface."""
-        return self.run.values.get(f"mechanics.tangential.{name}")
 
     def conductance(self, into: str) -> float | None:
         """Return the sum of the conductances between the interface and body '1' or '2' [W/(m^2 K)]."""
@@ -153,7 +138,7 @@ class SceneView:
     @property
     def adiabatic_rise(self) -> float | None:
         """Temperature rise [K] by the heat of all bonds; zero in reservoirs."""
-        heat = self.potential("H_r")
+        heat = self.read("potential", "H_r")
         return None if heat is None else heat / self.capacity if self.capacity else 0.0
 
     # -- the start -----------------------------------------------------------------------------------------------------
@@ -174,8 +159,8 @@ class SceneView:
         initial rate it may be a parameter of a law.
         """
         if not self.bonding_rate:
-            return self.reaction("tau")
-        equilibrium = self.potential("phi_eq")
+            return self.read("reaction", "tau")
+        equilibrium = self.read("potential", "phi_eq")
         return ((1.0 if equilibrium is None else equilibrium) - self._states["phi"]) / self.bonding_rate
 
     @property
@@ -221,7 +206,7 @@ def read(**readings: str) -> dict[str, tuple[str, str]]:
     """
     found = {}
     for reading, names in readings.items():
-        assert hasattr(SceneView, reading), reading
+        assert reading in (*LAWS, *PATHS) or hasattr(SceneView, reading), reading
         for name in names.split():
             ours, _, theirs = name.partition("=")
             found[ours] = (reading, theirs or ours)

@@ -381,7 +381,7 @@ class SuddenDebonding(UniformBody):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        loaded = scene.initial("t_n") if "t_n" in scene.scene.loading else scene.limit("t_max")
+        loaded = scene.initial("t_n") if "t_n" in scene.scene.loading else scene.read("limit", "t_max")
         return {**super().from_scene(scene), "t_n": loaded}
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -168,68 +169,87 @@ of 16 Gauss points is 25^-32."""
 
 
 @dataclass(frozen=True)
-class PullOffFold:
-    """A state at which the quasi-static gap loses its equilibrium, and the gap after the jump."""
+class Jump:
+    """A gap at which the equilibrium is lost, with displacement and traction there, the gap after the jump, and the
+    energy that the jump turns into heat.
+    """
 
     g: float
     w: float
     t: float
     g_after: float
     release: float
-    """Energy [J/m^2] that the jump turns into heat."""
 
 
-class CohesiveZoneOnSpring(Reference):
+class AttractionOnSpring(Reference):
+    """Bodies that attract each other, one of them on a spring: their gaps in equilibrium, and the jumps between them.
+
+    Energies and forces are per area, or those of the whole pair.
+    """
+
+    k: float
+
+    readings = read(normal="k")
+
+    @abstractmethod
+    def derivative(self, g: Array, order: int) -> Array:
+        """Return a derivative of the energy of the attraction over the gap, of order 0 to 2."""
+
+    def traction(self, g: Array) -> Array:
+        """Return the force at a gap, tension positive."""
+        return self.derivative(g, 1)
+
+    def displacement(self, g: Array) -> tuple[Array, Array]:
+        """Return the far-field displacement [m] at which a gap is in equilibrium, and its slope."""
+        return g + self.derivative(g, 1) / self.k, 1.0 + self.derivative(g, 2) / self.k
+
+    def gap(self, w: Array, low: float, high: float) -> Array:
+        """Return the gap [m] in equilibrium at displacements w, on a stable branch between two gaps."""
+        return increasing_root(self.displacement, w, np.full_like(w, low), np.full_like(w, high))
+
+    def jump(self, g: float, low: float, high: float) -> Jump:
+        """Return the jump from a gap to the branch between two others, at the same displacement."""
+        w = self.displacement(np.array([g]))[0]
+        both = np.array([g, self.gap(w, low, high)[0]])
+        before, after = 0.5 * self.k * (w - both) ** 2 + self.derivative(both, 0)
+        t, g_after = self.k * (w[0] - g), both[1]
+        return Jump(g, float(w[0]), float(t), float(g_after), float(before - after))
+
+
+class CohesiveZoneOnSpring(AttractionOnSpring):
     """An exponential cohesive zone in series with a spring: its branches and folds."""
 
     t_max: float = parameter("Pa", "strength", above=0)
     g_0: float = parameter("m", "gap at the strength", above=0)
     k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
 
-    readings = read(potential="t_max g_0", normal="k")
+    readings = read(potential="t_max g_0")
 
     @property
     def severity(self) -> float:
         """Ratio of the stiffness to the steepest softening; from one on, every displacement has a unique gap."""
         return math.e * self.k * self.g_0 / self.t_max
 
-    def traction(self, g: Array) -> Array:
-        """Return the traction [Pa] of the zone."""
-        return np.asarray(self.t_max * g / self.g_0 * np.exp(1.0 - g / self.g_0))
-
-    def energy(self, g: float, w: float) -> float:
-        """Return the energy [J/m^2] of spring and zone."""
+    def derivative(self, g: Array, order: int) -> Array:
         u = g / self.g_0
-        return 0.5 * self.k * (w - g) ** 2 - self.t_max * self.g_0 * (1.0 + u) * math.exp(1.0 - u)
+        shape = (-(1.0 + u), u, 1.0 - u)[order] * np.exp(1.0 - u)
+        return np.asarray(self.t_max * self.g_0 ** (1 - order) * shape)
 
     def gap(self, w: Array, low: float, high: float) -> Array:
-        """Return the gap [m] at displacements w, on a stable branch between two gaps."""
-        lower = np.minimum(np.full_like(w, low), w)
-
-        def displacement(g: Array) -> tuple[Array, Array]:
-            slope = self.t_max / self.g_0 * (1.0 - g / self.g_0) * np.exp(1.0 - g / self.g_0)
-            return g + self.traction(g) / self.k, 1.0 + slope / self.k
-
-        return increasing_root(displacement, w, lower, np.maximum(np.minimum(w, high), lower))
+        lower = np.minimum(low, w)  # the zone only attracts
+        return increasing_root(self.displacement, w, lower, np.maximum(np.minimum(w, high), lower))
 
     @cached_property
-    def folds(self) -> tuple[PullOffFold, PullOffFold]:
-        """The folds of pull-off and of snap-in: at both x with x exp(-x) = k g_0 / t_max, g = g_0 (1 + x)."""
+    def folds(self) -> tuple[Jump, Jump]:
+        """Pull-off and snap-in: at both x with x exp(-x) = k g_0 / t_max, g = g_0 (1 + x)."""
         if self.severity >= 1.0:
             raise InputError(f"{self.name}: stable for every displacement; there is no jump.")
         distance = np.array([-math.log(self.severity)])
         low, high = np.sqrt(2.0 * distance), distance + np.sqrt(distance * (distance + 2.0))
         smaller = float(scaled_rise(np.array([self.severity]))[0])
         larger = 1.0 + float(increasing_root(log_remainder, distance, low, high)[0])
-        return self._fold(smaller, larger, math.inf), self._fold(larger, -1.0, smaller)
-
-    def _fold(self, x: float, low: float, high: float) -> PullOffFold:
-        """Return the jump from the gap at x to the branch between two others."""
-        g, t = self.g_0 * (1.0 + x), self.t_max * (1.0 + x) * math.exp(-x)
-        w = g + t / self.k
-        after = float(self.gap(np.array([w]), self.g_0 * (1.0 + low), self.g_0 * (1.0 + high))[0])
-        release = self.energy(g, w) - self.energy(after, w)
-        return PullOffFold(g, w, t, after, release)
+        near, far = self.g_0 * (1.0 + smaller), self.g_0 * (1.0 + larger)
+        return self.jump(near, far, math.inf), self.jump(far, 0.0, near)
 
 
 class CohesivePullOff(CohesiveZoneOnSpring):
@@ -319,11 +339,11 @@ class OverdampedPullOff(CohesiveZoneOnSpring):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        dampers = [c for c in (scene.normal(name) for name in ("c_b", "c_g")) if c is not None]
+        dampers = [c for c in (scene.read("normal", name) for name in ("c_b", "c_g")) if c is not None]
         return {**super().from_scene(scene), "c": sum(dampers) if dampers else None, "g_i": scene.initial("g_n")}
 
     @property
-    def fold(self) -> PullOffFold:
+    def fold(self) -> Jump:
         """Fold that is passed."""
         return self.folds[0]
 

@@ -127,6 +127,13 @@ class Bonding(PerfectContact):
         }
 
 
+def _from_reference(case: PerfectContact, t: Array) -> Quantities:
+    """Return the solution of a case of `Bonding` that starts without bonds at the reference temperature."""
+    given = {item.name: getattr(case, item.name) for item in fields(case)}
+    every = Bonding(**given, T_i=case.T_0).quantities(t)
+    return {name: every[name] for name in ("phi", "T", "q_1", "q_2")}
+
+
 class ExothermicBonding(PerfectContact):
     r"""Bonding that releases a constant energy, perfect thermal contact, quadratic energies.
 
@@ -147,14 +154,7 @@ class ExothermicBonding(PerfectContact):
     readings = read(potential="K_0", relaxation_time="tau")
 
     def quantities(self, t: Array) -> Quantities:
-        kappa = self.K_0 / (self.T_0 * self.C)
-        released = self.K_0 / self.tau * np.exp(-2.0 * t / self.tau)
-        return {
-            "phi": -np.expm1(-t / self.tau),
-            "T": self.T_0 * np.sqrt(1.0 - kappa * np.expm1(-2.0 * t / self.tau)),
-            "q_1": self.C_1 / self.C * released,
-            "q_2": self.C_2 / self.C * released,
-        }
+        return _from_reference(self, t)
 
 
 class EndothermicBonding(PerfectContact):
@@ -186,9 +186,7 @@ class EndothermicBonding(PerfectContact):
             raise InputError(f"{self.name}: K_2 must be below T_0 (C_1 + C_2 + C_c), the capacity it takes away.")
 
     def quantities(self, t: Array) -> Quantities:
-        given = {item.name: getattr(self, item.name) for item in fields(self)}
-        every = Bonding(**given, T_i=self.T_0).quantities(t)
-        return {name: every[name] for name in ("phi", "T", "q_1", "q_2")}
+        return _from_reference(self, t)
 
 
 class BimolecularBonding(Reference):

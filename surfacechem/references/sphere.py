@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
-from surfacechem.references.numerics import increasing_root
+from surfacechem.references.normal_contact import AttractionOnSpring, Jump
 
 SEARCH_POINTS = 4001
 """Number of approaches in the search for the steepest attraction, on either side of which the folds are bisected."""
@@ -24,17 +23,7 @@ PAIR_POWERS = {10: 1 / 45, 4: -1 / 3}
 """Coefficients of a pair energy of Lennard-Jones type by power, eq. e:psi12ex."""
 
 
-@dataclass(frozen=True)
-class SphereJump:
-    """An approach at which equilibrium is lost, the far-field displacement, and the released energy [J]."""
-
-    g: float
-    w: float
-    g_after: float
-    release: float
-
-
-class SphereOnSpring(Reference):
+class SphereOnSpring(AttractionOnSpring):
     """A sphere on a spring that is brought slowly to an attracting body and withdrawn again."""
 
     k: float = parameter("N/m", "stiffness of the spring", above=0)
@@ -44,7 +33,7 @@ class SphereOnSpring(Reference):
     w_turn: float = parameter("m", "displacement at which it turns")
     speed: float = parameter("m/s", "speed both ways", above=0)
 
-    readings = read(normal="k", surface="R g_0")
+    readings = read(surface="R g_0")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
@@ -56,34 +45,10 @@ class SphereOnSpring(Reference):
         drive = {"w_i": values[0], "w_turn": values[1], "speed": speed}
         return {**super().from_scene(scene), **drive}
 
-    @abstractmethod
-    def derivative(self, g: Array, order: int) -> Array:
-        """Return a derivative of the energy [J] over the approach."""
-
-    def energy(self, g: Array) -> Array:
-        """Return the energy [J] at an approach."""
-        return self.derivative(g, 0)
-
-    def force(self, g: Array) -> Array:
-        """Return the force [N] at an approach, tension positive: the slope of the energy."""
-        return self.derivative(g, 1)
-
-    def slope(self, g: Array) -> Array:
-        """Return the slope of the force [N/m]."""
-        return self.derivative(g, 2)
-
     @property
     def end_time(self) -> float:
         """Time [s] of the return to the initial displacement."""
         return 2 * (self.w_i - self.w_turn) / self.speed
-
-    def displacement(self, g: Array) -> tuple[Array, Array]:
-        """Return the displacement [m] at which an approach is in equilibrium, and its slope."""
-        return g + self.force(g) / self.k, 1 + self.slope(g) / self.k
-
-    def gap(self, w: Array, low: float, high: float) -> Array:
-        """Return the approach [m] in equilibrium at displacements, on a stable branch between two approaches."""
-        return increasing_root(self.displacement, w, np.full_like(w, low), np.full_like(w, high))
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -100,8 +65,8 @@ class SphereOnSpring(Reference):
         """Approaches [m] at which equilibrium is lost, on opening and on closing."""
         near, far = self.ends
         places = np.geomspace(LEAST_APPROACH * self.g_0, far, SEARCH_POINTS)
-        softest = float(places[np.argmin(self.slope(places))])
-        if self.slope(np.array([softest]))[0] >= -self.k:
+        softest = float(places[np.argmin(self.derivative(places, 2))])
+        if self.derivative(np.array([softest]), 2)[0] >= -self.k:
             raise InputError(f"{self.name}: the spring holds it everywhere; there is no jump.")
         return self._fold(near, softest, -1.0), self._fold(softest, far, 1.0)
 
@@ -110,21 +75,15 @@ class SphereOnSpring(Reference):
         """Return the approach [m] at which the slope of the force is minus the spring's stiffness, by bisection."""
         for _ in range(200):
             middle = (low + high) / 2
-            held = sign * (float(self.slope(np.array([middle]))[0]) + self.k)
+            held = sign * (float(self.derivative(np.array([middle]), 2)[0]) + self.k)
             low, high = (middle, high) if held < 0 else (low, middle)
         return (low + high) / 2
 
     @property
-    def jumps(self) -> tuple[SphereJump, SphereJump]:
+    def jumps(self) -> tuple[Jump, Jump]:
         """The pull-off and the snap-in."""
         (off, on), (near, far) = self.folds, self.ends
-        return self._jump(off, on, far), self._jump(on, near, off)
-
-    def _jump(self, g: float, low: float, high: float) -> SphereJump:
-        w = self.displacement(np.array([g]))[0]
-        both = np.array([g, self.gap(w, low, high)[0]])
-        before, after = self.k / 2 * (w - both) ** 2 + self.energy(both)
-        return SphereJump(g, float(w[0]), float(both[1]), float(before - after))
+        return self.jump(off, on, far), self.jump(on, near, off)
 
     def quantities(self, t: Array) -> Quantities:
         before = self.w_i - self.w_turn - self.speed * t
@@ -134,7 +93,7 @@ class SphereOnSpring(Reference):
         apart = np.where(before > 0, w >= w_on, (w > w_off) | (self.w_turn > w_on))
         open_gap, closed = self.gap(np.maximum(w, w_on), on, far), self.gap(np.minimum(w, w_off), near, off)
         g = np.where(apart, open_gap, closed)
-        return {"w_n": w, "g_n": g, "t_n": self.force(g)}
+        return {"w_n": w, "g_n": g, "t_n": self.traction(g)}
 
 
 class AttractingSphereOnSpring(SphereOnSpring):

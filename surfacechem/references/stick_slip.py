@@ -95,7 +95,7 @@ class StickSlip(Slider):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        mu, mu_s, p = scene.friction("mu"), scene.friction("mu_s"), scene.initial("p")
+        mu, mu_s, p = scene.read("friction", "mu"), scene.read("friction", "mu_s"), scene.initial("p")
         bears = {} if mu is None or p is None else {"t_k": mu * p, "t_s": max(mu, mu_s or 0.0) * p}
         return {**super().from_scene(scene), **bears}
 

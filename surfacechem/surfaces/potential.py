@@ -71,6 +71,20 @@ def integrating() -> Iterator[None]:
         INTEGRATION_TIME.seconds += time.perf_counter() - start
 
 
+def curves_of(integrated: Callable[[], Sequence[ApproachEnergy]], *given: Any) -> tuple[ApproachEnergy, ...]:
+    """Return curves that follow from what is given; they are integrated once, and stored in the cache.
+
+    Surfaces that differ only in their numbers, as in a sweep, have the same ones.
+    """
+    mark = fingerprint(*given)
+    if mark not in INTEGRATED_CURVES:
+        with integrating():
+            found = cached(mark, SOURCES, lambda: [curve.numbers for curve in integrated()])
+        log.info("running")
+        INTEGRATED_CURVES[mark] = tuple(map(ApproachEnergy.of, found))
+    return INTEGRATED_CURVES[mark]
+
+
 JUMP_SAMPLES = 2000
 """Number of points between which a law is tested for jumps."""
 
@@ -185,14 +199,8 @@ class CurvedSurfaces(Potential):
     def curves(self) -> tuple[tuple[ApproachEnergy, ...], ApproachEnergy | None]:
         """Energies over the approach: of the parts of all pair laws per product of densities, and of the gap laws."""
         parts = [part for law in self.pairs for _, part in self.parts(law)]
-        # Surfaces that differ only in their numbers, as in a sweep, have the same integrals.
-        mark = fingerprint(self.shapes, parts, self.gap_laws, self.approach, self.accuracy)
-        if mark not in INTEGRATED_CURVES:
-            with integrating():
-                found = cached(mark, SOURCES, lambda: [curve.numbers for curve in self.integrated(parts)])
-            log.info("running")
-            INTEGRATED_CURVES[mark] = tuple(map(ApproachEnergy.of, found))
-        curves = INTEGRATED_CURVES[mark]
+        given = self.shapes, parts, self.gap_laws, self.approach, self.accuracy
+        curves = curves_of(lambda: self.integrated(parts), *given)
         return curves[: len(parts)], next(iter(curves[len(parts) :]), None)
 
     def integrated(self, parts: Sequence[PairEnergy]) -> list[ApproachEnergy]:
@@ -395,7 +403,6 @@ class CurvedConductance(HeatTransfer):
     def curve(self) -> ApproachEnergy:
         """The conductance over the approach."""
         pair, law, levels = self.pair, density(self.law), kinks([self.law])
-        mark = fingerprint(pair.shapes, self.law, pair.approach, pair.accuracy)
         budget = Budget(pair.accuracy)
 
         def sample(d: float) -> tuple[float, float, float]:
@@ -404,15 +411,13 @@ class CurvedConductance(HeatTransfer):
                 found = over_gap(*pair.surfaces(d), [], levels, [law], finer, budget=budget)
             return found.conductance, found.conductance_slope, found.error
 
-        def integrated() -> list[Any]:
+        def integrated() -> list[ApproachEnergy]:
             # Conductance and slope are fitted like energy and force.
             cuts = level_approaches(*pair.surfaces(0.0), levels)
-            return fitted(sample, *pair.approach, pair.accuracy, cuts, budget=budget).numbers
+            return [fitted(sample, *pair.approach, pair.accuracy, cuts, budget=budget)]
 
-        if mark not in INTEGRATED_CURVES:
-            with integrating():
-                INTEGRATED_CURVES[mark] = (ApproachEnergy.of(cached(mark, SOURCES, integrated)),)
-        return INTEGRATED_CURVES[mark][0]
+        (curve,) = curves_of(integrated, pair.shapes, self.law, pair.approach, pair.accuracy)
+        return curve
 
     def conductance(self, g_n: Expression) -> Expression:
         """Return the conductance [W/K]."""

@@ -29,14 +29,14 @@ def test_no_exact_solution_claims_a_case_that_it_does_not_solve(name):
 @pytest.mark.parametrize(
     ("name", "read", "value"),
     [
-        ("compliant-debonding", lambda scene: scene.reaction("t_max"), 80e6),
-        ("compliant-debonding", lambda scene: scene.potential("t_max"), None),
-        ("viscous-heating", lambda scene: scene.friction("beta"), 0.04),  # of a factor
+        ("compliant-debonding", lambda scene: scene.read("reaction", "t_max"), 80e6),
+        ("compliant-debonding", lambda scene: scene.read("potential", "t_max"), None),
+        ("viscous-heating", lambda scene: scene.read("friction", "beta"), 0.04),  # of a factor
         ("three-temperatures", lambda scene: scene.total_conductance, 3200.0),
         ("three-temperatures", lambda scene: scene.conductance(into="2"), 700.0),
         ("pair-exchange", lambda scene: scene.conductance(into="1"), None),
-        ("stick-slip", lambda scene: scene.normal("m"), None),
-        ("stick-slip", lambda scene: scene.ramp("w_t"), 1e-3),
+        ("stick-slip", lambda scene: scene.read("normal", "m"), None),
+        ("stick-slip", lambda scene: scene.read("ramp", "w_t"), 1e-3),
         ("stick-slip-rebonding", lambda scene: scene.relaxation_time, pytest.approx(2.0)),
         ("cooling-to-zero", lambda scene: scene.heat_supply, -50.0),
     ],
