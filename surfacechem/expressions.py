@@ -7,7 +7,7 @@ SymEngine differentiates exactly and compiles. Every function here keeps its val
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache, reduce
 from typing import Any, TypeAlias
 
@@ -202,6 +202,40 @@ def where(condition: Expression, yes: Expression, no: Expression) -> Expression:
     import symengine
 
     return symengine.Piecewise((yes, condition), (no, True))
+
+
+def by_ranges(x: Expression, ranges: Sequence[tuple[Expression, Expression]], beyond: Expression) -> Expression:
+    """Return the value of the first of the ``ranges``, pairs of end and value, that ends above x; else ``beyond``.
+
+    >>> by_ranges(0.5, [(0.0, "low"), (1.0, "middle")], "high")
+    'middle'
+    """
+    for end, value in reversed(ranges):
+        beyond = where(x < end, value, beyond)
+    return beyond
+
+
+def polynomial(x: Expression, coefficients: Sequence[Expression]) -> Expression:
+    """Return the sum of powers of x with these coefficients, from the constant on, by Horner's rule.
+
+    >>> polynomial(2.0, [1.0, 0.0, 3.0])
+    13.0
+    """
+    return reduce(lambda value, coefficient: value * x + coefficient, reversed(coefficients))
+
+
+def cubics(
+    x: Expression, at: Sequence[float], values: Sequence[float], before: Expression, beyond: Expression
+) -> Expression:
+    """Return monotone cubics through points, with other values before the first and beyond the last of them.
+
+    Source: Fritsch & Butland (1984), doi 10.1137/0905021.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    rows = PchipInterpolator(at, values).c.T[:, ::-1].tolist()
+    ranges = [(high, polynomial(x - low, row)) for low, high, row in zip(at, at[1:], rows, strict=False)]
+    return by_ranges(x, [(at[0], before), *ranges], beyond)
 
 
 def exp(x: Expression) -> Expression:

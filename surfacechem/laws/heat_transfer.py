@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 
 from surfacechem.contracts.terms import HeatTransfer, UnderPressure, option, parameter
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, exp, positive, power, where
+from surfacechem.expressions import Expression, cubics, exp, positive, power
 from surfacechem.quantities import STEFAN_BOLTZMANN
 
 
@@ -207,14 +207,9 @@ class ConductanceTable(HeatTransfer):
         from scipy.interpolate import PchipInterpolator
 
         at, values, linear = self._at, self.conductances, self.extrapolation == "linear"
-        interpolation = PchipInterpolator(at, values)
-        cubics = interpolation.c.T.tolist()
-        slopes = interpolation((at[0], at[-1]), 1).tolist() if linear else (0.0, 0.0)
-        result = values[-1] + slopes[1] * (x - at[-1])
-        for (low, high), (a, b, c, d) in reversed(list(zip(pairwise(at), cubics, strict=True))):
-            z = x - low
-            result = where(x < high, d + z * (c + z * (b + z * a)), result)
-        result = where(x < at[0], values[0] + slopes[0] * (x - at[0]), result)
+        slopes = PchipInterpolator(at, values)((at[0], at[-1]), 1).tolist() if linear else (0.0, 0.0)
+        before, beyond = (values[k] + slopes[k] * (x - at[k]) for k in (0, -1))
+        result = cubics(x, at, values, before, beyond)
         return positive(result) if linear else result
 
 

@@ -14,12 +14,11 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import ClassVar
 
 from surfacechem.contracts.terms import PairEnergy, Potential, option, parameter
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, is_symbolic, log, positive, where
+from surfacechem.expressions import Expression, cubics, is_symbolic, log, positive, where
 
 REPULSION_WALL = 0.01
 """Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, continues as a parabola."""
@@ -401,23 +400,11 @@ class PairTable(PairEnergy):
         """The distances of the table, between which it is smooth."""
         return {"r": tuple(self.distances)}
 
-    @cached_property
-    def cubics(self) -> list[list[float]]:
-        """Coefficients between the points, that of the third power first."""
-        from scipy.interpolate import PchipInterpolator
-
-        coefficients: list[list[float]] = PchipInterpolator(self.distances, self.energies).c.T.tolist()
-        return coefficients
-
     def energy(self, r: Expression) -> Expression:
         """Return the energy of a pair [J]."""
         x, psi = self.distances, self.energies
-        result = 0.0 * r
-        for low, high, (a, b, c, d) in reversed(list(zip(x, x[1:], self.cubics, strict=False))):
-            z = r - low
-            result = where(r < high, d + z * (c + z * (b + z * a)), result)
         power = math.log(psi[0] / psi[1]) / math.log(x[0] / x[1])
-        return where(r < x[0], psi[0] * (r / x[0]) ** power, result)
+        return cubics(r, x, psi, psi[0] * (r / x[0]) ** power, 0.0 * r)
 
 
 def _power(m: float, unit: float) -> PairEnergy:

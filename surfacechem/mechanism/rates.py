@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Self, cast
 
 from surfacechem.contracts.terms import RateLaw, RateType, Spec, option, parameter, reads
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, log, log_fraction, log_sum, power, scaled_exp, where
+from surfacechem.expressions import Expression, log, log_fraction, log_sum, polynomial, power, scaled_exp, where
 from surfacechem.laws import laws
 from surfacechem.mechanism.thermo import Bind, Formula, Species
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT, KILO, MOLECULAR
@@ -46,9 +46,7 @@ class CoverageTerm:
 
     def exponent(self, theta: Expression, T: Expression) -> Expression:
         """Logarithm of the factor."""
-        energy: Expression = 0
-        for coefficient in reversed(self.E):  # Horner, from the first power on: E(0) = 0
-            energy = theta * (energy + coefficient)
+        energy: Expression = theta * polynomial(theta, self.E) if self.E else 0
         # One exponent for Cantera's three dependences, so that no factor overflows.
         value = self.a * math.log(10) * theta - energy / (GAS_CONSTANT * T)
         if self.m:

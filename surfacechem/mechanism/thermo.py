@@ -32,7 +32,7 @@ from itertools import chain, count
 from typing import Any, Self, cast
 
 from surfacechem.contracts.terms import Law, Potential, option, parameter
-from surfacechem.expressions import Expression, log, mixing, where
+from surfacechem.expressions import Expression, by_ranges, log, mixing, polynomial, where
 from surfacechem.mechanism.source import Source
 from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAS_CONSTANT, KILO
 from surfacechem.tolerances import EQUAL
@@ -259,11 +259,11 @@ class PiecewisePolynomial:
 
     def __call__(self, theta: Expression) -> Expression:
         """Return the value at a coverage."""
-        rows = [(start, _power_sum(c, theta)) for start, c in self.pieces]
-        value: Expression = rows[0][1] if rows else 0.0
-        for start, row in rows[1:]:
-            value = where(theta >= start, row, value)
-        return value
+        if not self.pieces:
+            return 0.0
+        *below, last = [polynomial(theta, c) for _, c in self.pieces]
+        ends = [start for start, _ in self.pieces[1:]]
+        return by_ranges(theta, list(zip(ends, below, strict=True)), last)
 
     @property
     def integral(self) -> PiecewisePolynomial:
@@ -271,16 +271,9 @@ class PiecewisePolynomial:
         pieces: list[tuple[float, tuple[float, ...]]] = []
         for start, c in self.pieces:
             whole = (0.0, *(value / (power + 1) for power, value in enumerate(c)))
-            past = _power_sum(pieces[-1][1], start) if pieces else 0.0
-            pieces.append((start, (past - _power_sum(whole, start), *whole[1:])))
+            past = polynomial(start, pieces[-1][1]) if pieces else 0.0
+            pieces.append((start, (past - polynomial(start, whole), *whole[1:])))
         return PiecewisePolynomial(tuple(pieces))
-
-
-def _power_sum(coefficients: Sequence[float], theta: Expression) -> Expression:
-    value: Expression = 0.0
-    for coefficient in reversed(coefficients):
-        value = value * theta + coefficient
-    return value
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, decay, log, where
+from surfacechem.expressions import Expression, by_ranges, decay, log
 from surfacechem.surfaces.patches import Budget
 from surfacechem.surfaces.projection import Array
 from surfacechem.tolerances import NEGLIGIBLE, TINY
@@ -110,11 +110,10 @@ class ApproachEnergy:
 
     def energy(self, d: Expression) -> Expression:
         """Return the energy at an approach [J]; below the least, which only trial states reach, it is linear."""
-        first, result = self.pieces[0], self.pieces[-1].energy(d)
-        for piece in reversed(self.pieces[:-1]):
-            result = where(d < piece.high, piece.energy(d), result)
+        first, last = self.pieces[0], self.pieces[-1]
         wall = first.energy(first.low) + self.force * (d - first.low)
-        return self.factor * where(d < first.low, wall, result)
+        ranges = [(first.low, wall), *((piece.high, piece.energy(d)) for piece in self.pieces[:-1])]
+        return self.factor * by_ranges(d, ranges, last.energy(d))
 
 
 class CachedSamples:
