@@ -15,6 +15,7 @@ from solver_problems import exothermic_problem, problem, robertson_sums
 
 import surfacechem
 from surfacechem.compile.program import compile_program
+from surfacechem.solve.contract import Guard
 from surfacechem.solve.lanes import lane_batch
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import solve_arrays
@@ -132,6 +133,27 @@ def test_a_step_onto_a_guard_may_be_shorter_than_time_resolves(left):
     found = lane_batch.solve_batch(problem, y0, table, *others)
     assert left[0] == 0
     assert_alike(found, solve_arrays(problem, y0, table, *others), problem.program.n, 1e-5)
+
+
+def test_a_step_onto_a_guard_that_fails_is_given_up(left):
+    """Bonds that share a growing load and cool a light interface as they break: short of the guard a long step has
+    seen, shorter ones may fail. All runs break, none by the stepper for single runs.
+    """
+    t, (phi, low, high, T, *rates) = se.Symbol("t"), se.symbols("phi low high T dphi dlow dhigh dT")
+    ramp, rebinding, activation, capacity = given = se.symbols("ramp rebinding activation capacity")
+    breaking = phi * se.exp(ramp * t / phi * 300 / T)
+    bonding = se.exp(activation * (1 / 300.0 - 1 / T)) * (rebinding * (1 - phi) - breaking)
+    sources = [bonding, T - low, T - high, (20 * bonding - 2 * T + low + high) / capacity]
+    rows = [rate - source for rate, source in zip(rates, sources, strict=True)]
+    program = compile_program(t, [phi, low, high, T], rates, given, rows, margins=[phi - 0.05])
+    table = np.array([0.2, 1.0, 4000.0, 1e-9]) * np.random.default_rng(0).uniform(0.85, 1.15, (64, 1, 4))
+    start = np.array([0.9, 300.0, 300.0, 300.0])
+    shared = problem(program, start, [0.0, 100.0], 1e-6, parameters=table[0], margins=(Guard.stop(),))
+    columns = np.tile(start, (64, 1)), table, np.array([shared.spacing]), np.zeros((1, 1)), shared.segments[None]
+    found = lane_batch.solve_batch(replace(shared, implicit_lanes=True), *columns, np.zeros((1, 0)))
+    assert left[0] == 0
+    wanted = solve_arrays(shared, *columns, np.zeros((1, 0)))
+    assert found.ends[:, 0] == pytest.approx(wanted.ends[:, 0], rel=1e-5)
 
 
 def test_runs_without_guards(left):

@@ -299,6 +299,14 @@ def _go_on(w: Any, lane: int) -> None:
 
 
 @compiled
+def _look_for_guards_anew(w: Any, lane: int) -> None:
+    """Go on by whole steps: if a step onto a guard fails, the step in which that was found has misled."""
+    w.landing[lane] = 0
+    for m in range(w.n_margins):
+        w.fired[m, lane] = 0.0
+
+
+@compiled
 def _conclude(w: Any, lane: int) -> None:
     """Decide about a trial step: repeat it, shorter or onto a guard, or accept it."""
     h = w.h[lane]
@@ -309,6 +317,7 @@ def _conclude(w: Any, lane: int) -> None:
         w.proposed[lane], w.again[lane] = w.following[lane], 1.0
         w.failed[lane] += 1
         w.rejected[lane] += 1
+        _look_for_guards_anew(w, lane)
     elif w.defect_at[lane] < 1.0:
         # End a step there, so that its last stage sees what the other stages have missed.
         w.aim[lane], w.proposed[lane] = w.t[lane] + w.defect_at[lane] * h, w.defect_at[lane] * h
