@@ -118,24 +118,29 @@ def divisors(expressions: Sequence[Any], t: Any, states: Sequence[Any]) -> tuple
     [(), (), (), ()]
     """
     degrees: dict[Any, float] = {}
-    divided = set()
     for expression in expressions:
         for part in _arguments_first(expression, lambda each: each.args, degrees):
-            kind, own = type(part).__name__, [degrees[each] for each in part.args]
-            if not any(own):
-                degrees[part] = float(part == t or part in states)
-            elif kind == "Add":
-                degrees[part] = max(own)
-            elif kind == "Mul":
-                degrees[part] = sum(own)
-            elif kind == "Pow" and part.args[1].is_Integer and (int(part.args[1]) > 0 or part.args[0] in states):
-                degrees[part] = own[0] * abs(int(part.args[1]))
-                divided |= {part.args[0]} if int(part.args[1]) < 0 else set()
-            else:
-                degrees[part] = math.inf
+            own = [degrees[each] for each in part.args]
+            degrees[part] = _degree(part, own, states) if any(own) else float(part == t or part in states)
         if degrees[expression] > MOST_DEGREE:
             return ()
+    powers = [part.args for part in degrees if type(part).__name__ == "Pow"]
+    divided = {base for base, power in powers if power.is_negative}
     return tuple(state in divided for state in states)
+
+
+def _degree(part: Any, own: Sequence[float], states: Sequence[Any]) -> float:
+    """Return the degree of an expression with arguments of these degrees; infinite if it is no polynomial of states and
+    their inverses.
+    """
+    match type(part).__name__:
+        case "Add":
+            return max(own)
+        case "Mul":
+            return sum(own)
+        case "Pow" if part.args[1].is_Integer and (part.args[1].is_positive or part.args[0] in states):
+            return own[0] * abs(int(part.args[1]))
+    return math.inf
 
 
 class _Parts:

@@ -169,7 +169,7 @@ of 16 Gauss points is 25^-32."""
 
 
 @dataclass(frozen=True)
-class Jump:
+class SnapPoint:
     """A gap at which the equilibrium is lost, with displacement and traction there, the gap after the jump, and the
     energy that the jump turns into heat.
     """
@@ -207,13 +207,13 @@ class AttractionOnSpring(Reference):
         """Return the gap [m] in equilibrium at displacements w, on a stable branch between two gaps."""
         return increasing_root(self.displacement, w, np.full_like(w, low), np.full_like(w, high))
 
-    def jump(self, g: float, low: float, high: float) -> Jump:
+    def jump(self, g: float, low: float, high: float) -> SnapPoint:
         """Return the jump from a gap to the branch between two others, at the same displacement."""
         w = self.displacement(np.array([g]))[0]
         both = np.array([g, self.gap(w, low, high)[0]])
         before, after = 0.5 * self.k * (w - both) ** 2 + self.derivative(both, 0)
         t, g_after = self.k * (w[0] - g), both[1]
-        return Jump(g, float(w[0]), float(t), float(g_after), float(before - after))
+        return SnapPoint(g, float(w[0]), float(t), float(g_after), float(before - after))
 
 
 class CohesiveZoneOnSpring(AttractionOnSpring):
@@ -240,7 +240,7 @@ class CohesiveZoneOnSpring(AttractionOnSpring):
         return increasing_root(self.displacement, w, lower, np.maximum(np.minimum(w, high), lower))
 
     @cached_property
-    def folds(self) -> tuple[Jump, Jump]:
+    def folds(self) -> tuple[SnapPoint, SnapPoint]:
         """Pull-off and snap-in: at both x with x exp(-x) = k g_0 / t_max, g = g_0 (1 + x)."""
         if self.severity >= 1.0:
             raise InputError(f"{self.name}: stable for every displacement; there is no jump.")
@@ -343,7 +343,7 @@ class OverdampedPullOff(CohesiveZoneOnSpring):
         return {**super().from_scene(scene), "c": sum(dampers) if dampers else None, "g_i": scene.initial("g_n")}
 
     @property
-    def fold(self) -> Jump:
+    def fold(self) -> SnapPoint:
         """Fold that is passed."""
         return self.folds[0]
 

@@ -11,7 +11,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
-from surfacechem.references.normal_contact import AttractionOnSpring, Jump
+from surfacechem.references.normal_contact import AttractionOnSpring, SnapPoint
 
 SEARCH_POINTS = 4001
 """Number of approaches in the search for the steepest attraction, on either side of which the folds are bisected."""
@@ -80,7 +80,7 @@ class SphereOnSpring(AttractionOnSpring):
         return (low + high) / 2
 
     @property
-    def jumps(self) -> tuple[Jump, Jump]:
+    def jumps(self) -> tuple[SnapPoint, SnapPoint]:
         """The pull-off and the snap-in."""
         (off, on), (near, far) = self.folds, self.ends
         return self.jump(off, on, far), self.jump(on, near, off)

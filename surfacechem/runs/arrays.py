@@ -161,12 +161,15 @@ class ArrayRuns:
         """Columns of the guards of impacts."""
         self.no_peaks = np.zeros((1, model.program.n_ledger + model.program.n_margins))
         """Largest accounts and guards before any evaluation: zero."""
-        every = self.keeps_extremes or bool(keep.series)
-        self.keeps_course = every or keep.balances
-        """True if more is kept than ends and events."""
-        course = self.problem.times if every else self.problem.times[[0, -1]]
-        self.shape = course if self.keeps_course else course[:0]
+        self.shape = self._shape(self.keeps_extremes or bool(keep.series), keep.balances)
         """Output times of a run of the case; none if nothing is kept of them."""
+        self.keeps_course = bool(len(self.shape))
+        """True if more is kept than ends and events."""
+
+    def _shape(self, course: bool, ends: bool) -> Array:
+        """Return the output times of a run of the case: all, or the first and the last, or none."""
+        times = self.problem.times
+        return times if course else times[[0, -1]] if ends else times[:0]
 
     def _first_problem(self, changes: Mapping[str, float]) -> Problem:
         """Return the problem of the first admissible run; InputError if none of the first FIRST_RUNS is admissible."""
