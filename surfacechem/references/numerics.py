@@ -51,9 +51,10 @@ def increasing_root(
     high: Array,
     start: Array | None = None,
     *along: NDArray[Any],
+    rounding: Array | None = None,
 ) -> Array:
     """Return the arguments at which an increasing `function`, given as value and slope, reaches `target` in [low,
-    high]; ``along`` are its further arguments, an entry for each root.
+    high], or comes as near as the ``rounding`` of the target; ``along`` are its further arguments, one for each root.
 
     Newton's method inside a shrinking bracket, from `low` unless a better guess is given. Without further arguments all
     roots are of one function: cubics through the first values on both sides of each give the next guess. It ends when
@@ -64,6 +65,7 @@ def increasing_root(
     array([1.41421356])
     """
     x = low if start is None else np.clip(start, low, high)
+    rounding = FEW_EPS * np.abs(target) if rounding is None else rounding
     found, left, before = x.copy(), np.arange(len(x)), np.zeros_like(x)
     for _ in range(MOST_ITERATIONS):
         if not len(left):
@@ -83,13 +85,14 @@ def increasing_root(
             following = np.where(inside, following, 0.5 * (low + high))
             step = np.minimum(np.abs(following - x), high - low)
             after = step**2 * np.where(np.isnan(bend), step / before**2, bend)
-        reached = np.abs(error) <= FEW_EPS * np.abs(target)
+        reached = np.abs(error) <= rounding
         last = inside & (step <= SQRT_EPS * np.abs(x)) & (after <= FEW_EPS * np.abs(x))
         goes_on = ~(reached | (step <= FEW_EPS * np.abs(x)) | last)
         x, before = np.where((error == 0.0) | (reached & ~inside), x, following), np.where(shared, 0.0, step)
         found[left] = x
         if not goes_on.all():  # most of the time is that of the function
-            left, x, before, low, high, target = (each[goes_on] for each in (left, x, before, low, high, target))
+            left, x, before, low, high = (each[goes_on] for each in (left, x, before, low, high))
+            target, rounding = target[goes_on], rounding[goes_on]
             along = tuple(each[goes_on] for each in along)
     raise ArithmeticError(f"no root found between {low} and {high}")
 
@@ -197,7 +200,8 @@ class AutonomousODE:
 
         target = np.minimum(t, self.duration) - self.times[j]
         guess = self._guess(target, self.slowness[j])
-        share = increasing_root(elapsed, target, np.zeros_like(target), np.ones_like(target), guess, *panels)
+        ends, rounding = (np.zeros_like(target), np.ones_like(target)), FEW_EPS * np.minimum(t, self.duration)
+        share = increasing_root(elapsed, target, *ends, guess, *panels, rounding=rounding)
         distance = np.where(t < self.duration, start + share * (stop - start), 0.0)
         rest = self.length - distance
         return np.where(from_end, rest, distance), np.where(from_end, distance, rest)
@@ -279,7 +283,8 @@ def remainder(q: Array) -> Array:
     def series(near: Array) -> Array:
         found = np.full(near.shape, INVERSE_FACTORIALS[-1])
         for coefficient in INVERSE_FACTORIALS[-2::-1]:
-            found = coefficient - near * found
+            found *= near
+            np.subtract(coefficient, found, out=found)
         return np.asarray(near**2 * found)
 
     def apart(far: Array) -> Array:
@@ -326,10 +331,12 @@ def _by_range(
 
 def _asymptotic(n: int, x: Array) -> Array:
     r"""Return the asymptotic series of :math:`e^xE_n(x)`."""
-    term, total = 1.0 / x, 1.0 / x
+    inverse = 1.0 / x
+    term, total = inverse.copy(), inverse.copy()
     for k in range(n, n + ASYMPTOTIC_TERMS):
-        term = -term * k / x
-        total = total + term
+        term *= inverse
+        term *= -k
+        total += term
     return total
 
 
