@@ -73,10 +73,8 @@ class SceneView:
 
     def _constant(self, laws: Iterable[Law], name: str) -> float | None:
         """Return a constant of one of the laws, or of a factor of one of its parameters."""
-        paths = []
-        for law in laws:
-            paths += [law.path, *(factor.path for factor in law.factors)]
-        found = [self.run.values[f"{path}.{name}"] for path in paths if f"{path}.{name}" in self.run.values]
+        values, owners = self.run.values, (owner for law in laws for owner in (law, *law.factors))
+        found = [values[path] for owner in owners if (path := f"{owner.path}.{name}") in values]
         return found[0] if len(found) == 1 else None
 
     def surface(self, name: str) -> float | None:

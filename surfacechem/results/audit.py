@@ -173,14 +173,13 @@ def residuals(system: System, named: Mapping[str, Array], ledger: Array) -> list
     """
     # Transitions at the very start are booked before the first output.
     ledger = ledger - ledger[..., :1, :]
-
     found = []
     for (total, parts), (supplies, sinks) in zip(TOTALS, ACCOUNT_KINDS, strict=True):
         residual, *changes = [named[name] - named[name][..., :1] for name in (total, *parts) if name in named]
-        own = [accounts(system, ledger, kind) for kind in (*supplies, *sinks)]
-        for booked in own[: len(supplies)]:
-            residual = residual - booked.sum(axis=-1)
-        exchanged = np.concatenate([*own, *[part[..., None] for part in changes]], axis=-1)
+        own = accounts(system, ledger, *supplies, *sinks)
+        booked = sum(len(system.account_columns.get(kind, ())) for kind in supplies)
+        residual = residual - own[..., :booked].sum(axis=-1)
+        exchanged = np.concatenate([own, *[part[..., None] for part in changes]], axis=-1)
         # NumPy is slow in finding the largest of a few numbers in each of many rows, not of a few rows of many.
         in_rows = np.abs(exchanged.reshape(*exchanged.shape[:-2], -1).T, order="C")
         found.append((residual, np.maximum.reduce(in_rows, axis=0, initial=0.0)))

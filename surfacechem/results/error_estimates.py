@@ -154,14 +154,17 @@ def against_exact(
     from surfacechem.references.base import SceneView
     from surfacechem.results.matching import exact_values, in_range, match
 
-    # Its parameters are read at the start of the run.
-    reference = match(name, options, SceneView(scene, trajectory.picked(slice(1))))
+    # With cells, whose layers are unresolved at first, errors are taken at the requested times.
+    seen = trajectory if trajectory.model.system.profiles else trajectory.stored
+    # Its parameters are read at the start of the run; of many outputs the others are not needed.
+    begun = seen if len(seen.result.times) <= MOST_TIMES else seen.picked(slice(1))
+    reference = match(name, options, SceneView(scene, begun))
     if late is None:
         with in_range():
             late = _event_errors(trajectory, reference, second)
     latest = max(late.values(), default=0.0)
-    # With cells, whose layers are unresolved at first, errors are taken at the requested times.
-    seen = trajectory if trajectory.model.system.profiles else fewer(trajectory.stored, latest)
+    if not trajectory.model.system.profiles:
+        seen = fewer(seen, latest)
     exact = exact_values(reference, scene, seen, to_the_end=True, side=max(SIDE, latest))
     alike = _off_events(seen, latest)
     for values in exact.values():  # a solution that ends with an infinite slope has no value at its last moment
@@ -197,6 +200,8 @@ def _off_events(trajectory: Trajectory, late: float) -> Mask:
     """
     result, end, stopped = trajectory.result, trajectory.run.times[-1], trajectory.status == "stopped"
     moments = np.array(sorted({*(jump.t for jump in trajectory.jumps), *[result.t] * stopped}))
+    if not len(moments):
+        return np.ones(len(result.times), bool)
     brief = BRIEF_PART * np.diff([0.0, *moments, max([end, *moments[-1:]])])
     ways = moments - np.maximum(brief[:-1], 2 * late * moments), moments + np.maximum(brief[1:], 2 * late * moments)
     return clear_of(result.times, np.transpose(ways))

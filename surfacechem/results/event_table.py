@@ -140,6 +140,8 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
 
 def _lasting(trajectory: Trajectory) -> list[EventRow]:
     """Return the events without those that others at the same time undo: modes and states are equal around them."""
+    if not trajectory.jumps:
+        return events_of(trajectory)
     problem, symbols = trajectory.result.problem, {mode.symbol for mode in trajectory.model.system.modes}
     modes = [j for j, parameter in enumerate(trajectory.model.system.parameters) if parameter.symbol in symbols]
     moments: list[list[Jump]] = []

@@ -74,11 +74,12 @@ def _lines(ways: Array, values: Array) -> Array:
     """
     found = np.zeros(max(values.shape[1] - 1, 0))
     if len(found) > 1:
-        rise = np.diff(values)
+        rise = values[:, 1:] - values[:, :-1]
         for way in ways:
-            length = np.diff(way)
+            length = way[1:] - way[:-1]
             with np.errstate(all="ignore"):  # no length over the logarithm before the first time
-                bend = np.abs(np.diff(rise / length)).max(axis=0, initial=0.0) / (way[2:] - way[:-2])
+                slope = rise / length
+                bend = np.abs(slope[:, 1:] - slope[:, :-1]).max(axis=0, initial=0.0) / (way[2:] - way[:-2])
                 # A line of this length misses its length squared times bend / 4.
                 density = np.nan_to_num(np.sqrt(3 / 8 * bend), posinf=0.0)
             found = np.fmax(found, length / 2 * (np.append(density, density[-1]) + np.append(density[0], density)))
@@ -202,7 +203,7 @@ def refined(trajectory: Trajectory) -> Trajectory:
     t, sides = _two_sided(rows.t)
     # Times at which cells do not yet resolve a thermal layer are left out, except its start.
     system, end = trajectory.model.system, trajectory.run.times[-1]
-    sides &= ~unresolved(system, end, t) | np.isin(t, layer_starts(system, end))
+    sides &= ~unresolved(system, end, t) | among(t, layer_starts(system, end))
     rows, which, moments = rows._replace(t=t), np.flatnonzero(sides), _event_times(trajectory)
     # Each block begins with the last row of the one before.
     blocks, resolution, found = range(0, max(len(which) - 1, 1), ROWS_AT_ONCE - 1), _Resolution(), []

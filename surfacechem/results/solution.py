@@ -152,7 +152,7 @@ class Solution(Results):
             columns.append(Column(f"{name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}"))
         errors = accuracy.everywhere
         known = {DATASET_NAMES.get(name, name): error for name, error in errors.items()}
-        columns = [column._replace(error=known.get(column.name)) for column in columns]
+        columns = [c._replace(error=known[c.name]) if c.name in known else c for c in columns]
         columns += event_columns([trajectory])
         if not trajectory.model.system.in_totals:
             return tuple(columns)

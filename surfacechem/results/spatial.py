@@ -123,7 +123,7 @@ def resolved_after(system: System, end: float) -> float:
 
 def layer_starts(system: System, end: float) -> Array:
     """Return the times [s] at which a thermal layer may begin: the start, and the breakpoints of loads."""
-    return np.unique([0.0, *(t for t in system.breakpoints if 0 < t < end)])
+    return np.array(sorted({0.0, *(t for t in system.breakpoints if 0 < t < end)}))
 
 
 def unresolved(system: System, end: float, t: Array) -> NDArray[np.bool_]:
