@@ -176,6 +176,8 @@ class Program:
     """Compile the code for eight cases at once, True for implicit steps; None if that is not possible."""
     margin_inputs: frozenset[int] = frozenset()
     """Positions of the inputs that margins read."""
+    key: str | None = None
+    """Key of its code in the cache, if it is kept there: a digest of all that determines it."""
 
     @cached_property
     def plain_margins(self) -> bool:
@@ -354,24 +356,27 @@ class _Compilation:
     make: Callable[[], Any] = field(compare=False)
 
 
-def kept(make: Callable[[], T], origin: Any, expressions: Iterable[Any]) -> T:
-    """Return what is compiled from expressions, read from the cache if it has been before, in any process.
+def key_of(expressions: Iterable[Any], *others: Any) -> str:
+    """Return the key of what is compiled from expressions and ``others``, plain values: a digest of these, of this
+    package's code, and of the expressions, exact to the last bit.
 
-    The key is the ``origin`` of the expressions, this package's code, and the expressions themselves, exact to the last
-    bit: laws of a user and data of other libraries determine them too. So nothing has to be expanded or differentiated
-    on the way to code that is there. What has no origin, or one that cannot be pickled, is compiled from its parts.
+    So nothing has to be expanded or differentiated on the way to code that is there.
     """
-    if origin is None:
-        return make()
-    try:
-        scene = pickle.dumps(origin)
-    except Exception:  # a scene may contain objects of other libraries, which raise anything
-        return make()
-    sources = [source_digest(str(path)) for path in sorted(PACKAGE.rglob("*.py"))]
     # Not their hashes: SymEngine's are equal for numbers such as 0.1 and 0.2.
-    parts = serialised(tuple(expressions))
-    digest = hashlib.sha256(repr((scene, sources, parts)).encode()).hexdigest()
-    found: T = _compiled(_Compilation(digest, make))
+    return hashlib.sha256(repr((others, _source_digests(), serialised(expressions))).encode()).hexdigest()
+
+
+@lru_cache(maxsize=1)
+def _source_digests() -> list[str]:
+    """Return the digests of this package's files."""
+    return [source_digest(str(path)) for path in sorted(PACKAGE.rglob("*.py"))]
+
+
+def kept(make: Callable[[], T], key: str | None) -> T:
+    """Return what is compiled under a key, read from the cache if it has been before, in any process."""
+    if key is None:
+        return make()
+    found: T = _compiled(_Compilation(key, make))
     return found
 
 
@@ -387,7 +392,7 @@ def _digest(inputs: tuple[Any, ...]) -> str:
     return hashlib.sha256("\n".join(serialised(inputs)).encode()).hexdigest()
 
 
-def serialised(expressions: Sequence[Any]) -> list[str]:
+def serialised(expressions: Iterable[Any]) -> list[str]:
     """Return expressions as text, exact to the last bit and in their order.
 
     Each part occurs once, with the positions of its arguments; last are the positions of the expressions themselves.
@@ -398,24 +403,28 @@ def serialised(expressions: Sequence[Any]) -> list[str]:
     """
     places: dict[Any, int] = {}
     parts: list[str] = []
-    wanted = [symengine.sympify(expression) for expression in expressions]
-    left: list[tuple[Any, Any]] = [(part, None) for part in reversed(wanted)]
-    while left:
-        part, args = left.pop()
-        if part in places:
-            continue
-        if args is None:  # SymEngine makes new arguments at each access
-            args = part.args
-            missing = [(arg, None) for arg in args if arg not in places]
-            if missing:
-                left.append((part, args))
-                left += missing[::-1]
-                continue
-        places[part] = len(parts)
-        kind = type(part).__name__
-        own = [places[arg] for arg in args] or part
-        parts.append(float(part).hex() if kind == "RealDouble" else f"{kind} {own}")
-    return [*parts, str([places[part] for part in wanted])]
+
+    def places_of(whole: Iterable[Any]) -> list[int]:
+        """Return the positions of expressions, of which the missing ones are written."""
+        own: list[int] = []
+        left: list[tuple[Any, Iterator[Any], list[int]]] = [(None, iter(whole), own)]
+        while left:
+            part, args, found = left[-1]
+            for arg in args:
+                if (place := places.get(arg)) is None:
+                    left.append((arg, iter(arg.args), []))
+                    break
+                found.append(place)
+            else:
+                left.pop()
+                if left:
+                    left[-1][2].append(places.setdefault(part, len(parts)))
+                    kind = type(part).__name__
+                    parts.append(float(part).hex() if kind == "RealDouble" else f"{kind} {found or part}")
+        return own
+
+    wanted = places_of(map(symengine.sympify, expressions))
+    return [*parts, str(wanted)]
 
 
 Named = Sequence[tuple[Any, Any]]
@@ -562,12 +571,12 @@ def compile_program(
     margins: Sequence[Any] = (),
     chains: Sequence[Chain] = (),
     named: Named = (),
-    origin: Any = None,
+    keeps: bool = False,
 ) -> Program:
     """Compile a system, with Jacobians differentiated from its residual; expressions may contain ``named`` symbols.
 
-    States and equations of chains come after the others, chain by chain. With an ``origin`` of the expressions the
-    result is :func:`kept`.
+    States and equations of chains come after the others, chain by chain. The code is in the cache afterwards if the
+    program ``keeps`` it.
     """
     if not len(states) == len(derivatives) == len(residual):
         counts = f"{len(states)} states, {len(derivatives)} derivatives and {len(residual)} equations"
@@ -575,6 +584,9 @@ def compile_program(
     inputs = [t, *states, *derivatives, *parameters]
     parts = inputs, len(states), residual, ledger, margins, chains, named
     every = *inputs, *residual, *ledger, *margins, *(part for pair in named for part in pair)
+    # Where each kind of expressions ends in the list of all of them.
+    lengths = len(inputs), len(states), len(ledger), len(margins)
+    key = key_of(every, lengths, tuple(chains)) if keeps else None
     return Program(
         n=len(states),
         n_parameters=len(parameters),
@@ -583,7 +595,8 @@ def compile_program(
         chains=tuple(chains),
         solved=partial(_compiled_rates, inputs, residual, derivatives, chains, named),
         laned=partial(_compiled_lanes, inputs, residual, derivatives, chains, (ledger, margins), named),
-        **kept(partial(_compiled_parts, *parts), (origin, chains) if origin else None, every),
+        key=key,
+        **kept(partial(_compiled_parts, *parts), key),
     )
 
 

@@ -21,6 +21,7 @@ from surfacechem.compile.program import (
     compile_function,
     compile_program,
     kept,
+    key_of,
 )
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import PATHS, InputError, suggestion
@@ -430,7 +431,8 @@ class Model:
         self.system = system
         self.margins = system.event_margins
         """Margins that can close during the run; the others are checked at the start only."""
-        names = [item.symbol for item in system.named]
+        names, formed = [item.symbol for item in system.named], [item.expression for item in system.named]
+        local = system.local_time(formed)
         program = compile_program(
             system.t,
             inputs[1 : n + 1],
@@ -440,8 +442,8 @@ class Model:
             system.local_time([account.rate for account in system.ledger]),
             system.local_time([m.expression for m in self.margins] + [edge.guard for edge in system.edges]),
             chains=[Chain(*chain) for chain in system.chains],
-            named=list(zip(names, system.local_time([x.expression for x in system.named]), strict=True)),
-            origin=system.origin,
+            named=list(zip(names, local, strict=True)),
+            keeps=system.origin is not None,
         )
         self.program = replace(
             program,
@@ -449,9 +451,10 @@ class Model:
             groups=tuple(GROUPS.get(account.kind, -1) for account in system.ledger),
         )
         self.jumper = Jumper(system, self.program) if system.has_arcs else None
-        origin = system.origin and (system.origin, [item.name for item in system.outputs])
-        expressions = *inputs, *(part for item in system.named for part in (item.symbol, item.expression))
-        self.output_function: Function = kept(self._compiled_outputs, origin, expressions)
+        # The program's key has the inputs, and the expressions that are the same in both times.
+        own = [each for each, other in zip(formed, local, strict=True) if each is not other]
+        key = program.key and key_of(own, program.key, [item.name for item in system.outputs])
+        self.output_function: Function = kept(self._compiled_outputs, key)
         self.compile_seconds = time.perf_counter() - start
         """Time to compile the equations, and the functions first needed in a run: gaps, guards and jumps."""
 

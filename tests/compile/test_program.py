@@ -90,33 +90,40 @@ def test_a_scene_that_was_compiled_before_is_read_and_gives_the_same_bits(case, 
     assert run() == first
 
 
-def test_code_is_kept_by_origin_expressions_and_sources(tmp_path, monkeypatch) -> None:
+def test_code_is_kept_by_expressions_structure_and_sources(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
     x, made = se.Symbol("x"), []
 
-    def count(origin: object, *expressions: se.Basic) -> int:
+    def count(lengths: tuple[int, ...], *expressions: se.Basic) -> int:
         program._compiled.cache_clear()  # as in another process
-        program.kept(lambda: made.append(0), origin, expressions)
+        program.kept(lambda: made.append(0), program.key_of(expressions, lengths))
         return len(made)
 
-    assert [count("scene", x, x + 0.1) for _ in range(2)] == [1, 1]
-    assert count("another scene", x, x + 0.1) == 2
-    assert count("scene", x, x + np.nextafter(0.1, 1)) == 3
-    assert count("scene", x, x + 0.4) == 4  # SymEngine's hash is that of x + 0.1
-    assert count("scene", x) == 5
+    assert [count((1, 1), x, x + 0.1) for _ in range(2)] == [1, 1]
+    assert count((2, 0), x, x + 0.1) == 2
+    assert count((1, 1), x, x + np.nextafter(0.1, 1)) == 3
+    assert count((1, 1), x, x + 0.4) == 4  # SymEngine's hash is that of x + 0.1
+    assert count((1, 1), x, se.Symbol("y") + 0.1) == 5
+    assert count((1, 1), x) == 6
     with monkeypatch.context() as patch:
-        patch.setattr(program, "source_digest", lambda _: "another")
-        assert count("scene", x) == 6
-    assert count("scene", x) == 6
+        patch.setattr(program, "_source_digests", lambda: ["another"])
+        assert count((1, 1), x) == 7
+    assert count((1, 1), x) == 7
+    for nothing in range(8, 10):
+        program.kept(lambda: made.append(0), None)
+        assert len(made) == nothing
 
-    class Surface:
-        """An object of another library, which may not be pickled, as Cantera's interfaces with neighbours."""
 
-        def __reduce__(self) -> str:
-            raise NotImplementedError
-
-    for nobody_else_knows in (None, lambda: None, Surface()):
-        assert count(nobody_else_knows, x) + 1 == count(nobody_else_knows, x)
+def test_code_does_not_depend_on_where_a_case_lies(tmp_path, monkeypatch) -> None:
+    """Nor on its title or its laws' names: equations alone make it."""
+    (tmp_path / "other.yaml").write_text(
+        surfacechem.load("dna-adhesive").case.text.replace("title: ", "title: Another ")
+    )
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path / "cache"))
+    first = surfacechem.load("dna-adhesive").model.program.key
+    assert surfacechem.load(tmp_path / "other.yaml").model.program.key == first
+    assert surfacechem.load("dna-adhesive", ["heat.conductance.h=2 kW/m^2/K"]).model.program.key == first
+    assert surfacechem.load("exothermic").model.program.key != first
 
 
 def test_a_system_with_less_in_it_is_another_one() -> None:
