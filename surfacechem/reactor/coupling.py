@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from math import isclose
+from math import isclose, isfinite
 from typing import Any, NoReturn, Self
 
 import cantera
@@ -249,6 +249,8 @@ def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
         if name not in known:
             reason = "" if name not in LOADABLE else " Its rate takes part; prescribe its history under `loading`."
             raise InputError(f"'{name}' is no load that a network can give.{suggestion(name, known)}{reason}")
+        if not isfinite(values[name]):
+            raise InputError(f"the load {name} is {values[name]} at the start, no finite number.")
     given: dict[str, Load] = {name: Hold(level=value) for name, value in values.items()}
     if isinstance(engine, SurfaceEngine):
         scene = replace(scene, interface=replace(scene.interface, engine=engine.driven(given)))
@@ -258,10 +260,18 @@ def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
 def function_of(scene: Scene, name: str, load: Callable[[float], float] | float | str) -> Callable[[float], float]:
     """Return a load as a function of time; InputError unless it is a function, a number or a text with a unit."""
     if callable(load):
-        return load
+        return lambda t: _number_of(name, t, load(t))
     unit = load_units(scene).get(name)
     level = parse(load, unit, name=name) if unit else 0.0  # reported later
     return lambda _: level
+
+
+def _number_of(name: str, t: float, value: Any) -> float:
+    """Return what a load of the script is at a time [s]; InputError unless it is a number."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"the load {name} is a number in SI at each time; at t = {t:g} s it is {value!r}.") from None
 
 
 def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:

@@ -188,7 +188,7 @@ class EmbeddedScene:
         """Whether loads are asked for their values."""
         try:
             scene = coupling.with_heat(coupling.with_reactors(case.scene, reactors), heated)
-            scene = coupling.with_loads(scene, {name: float(function(0.0)) for name, function in loads.items()})
+            scene = coupling.with_loads(scene, {name: function(0.0) for name, function in loads.items()})
             scene = coupling.with_neighbours(scene, neighbours or {})
             system = assemble(scene).with_multipliers()
             _refuse_folds(system)
@@ -276,7 +276,7 @@ class EmbeddedScene:
         self._asks = True
         try:
             for path, function in self.loads.items():
-                self.evaluation.parameters[self.places[path]] = float(function(t))
+                self.evaluation.parameters[self.places[path]] = function(t)
         finally:
             self._asks = False
 
@@ -428,7 +428,8 @@ class History:
         """
         if len(self.times) < 2:
             raise InputError("nothing was recorded yet: advance the network, or call `record`, at least twice.")
-        run = Run(times=(0.0, self.times[-1]), rtol=self.rtol, solver="cantera")
+        end = max(self.times[-1], self.times[-1] - self.times[0])  # a network may begin before zero
+        run = Run(times=(0.0, end), rtol=self.rtol, solver="cantera")
         reason = stop or f"reached the end at t = {self.times[-1]:.9g} s"
         status = "stopped" if stop else "finished"
         result = self._result(Status.EVENT if stop else Status.FINISHED)

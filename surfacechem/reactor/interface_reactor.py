@@ -406,7 +406,7 @@ class InterfaceReactor(StateVectorReactor):
     def _stands_still(self, t: float) -> bool:
         """True if steps are as short as the rounding of the time, other than after a start."""
         step = t - self._last[0] if self._last is not None else 0.0
-        return 0 < step <= 2 * FEW_EPS * t and t - self.restarted > RUN_EPS * t
+        return 0 < step <= 2 * FEW_EPS * abs(t) and t - self.restarted > RUN_EPS * abs(t)
 
     def inputs_at(self, t: float) -> object:
         """Return everything that the rates at a time [s] depend on besides the variables."""
@@ -520,6 +520,8 @@ class InterfaceReactor(StateVectorReactor):
             self.record(t)
 
     # -- results ------------------------------------------------------------------------------------------------------
+
+    __iter__ = None  # lest Python asks for the quantities 0, 1, 2
 
     def __getitem__(self, name: str) -> float:
         """Return the present value, in SI units, of a state or of a named quantity of the scene.

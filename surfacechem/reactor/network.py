@@ -51,18 +51,39 @@ class ReactorNet(cantera.ReactorNet):
     """
 
     def __init__(self, reactors: Sequence[Any] = ()) -> None:
-        self.interfaces: list[InterfaceReactor] = []
         self._fresh = True
         self._started = -np.inf
         self._last_surroundings: list[object] = []
         """Quantities besides the variables on which rates depend, at the present time."""
         super().__init__(reactors)
-        self.interfaces += [reactor for reactor in reactors if isinstance(reactor, InterfaceReactor)]
-        _number([reactor for reactor in reactors if isinstance(reactor, StateVectorReactor)])
+        for reactor, count in Counter(self.reactors).items():  # Cantera has taken them from the argument
+            if count > 1:
+                raise InputError(f"{reactor.name} stands {count} times in the list of reactors: give it once.")
+        _number([reactor for reactor in self.reactors if isinstance(reactor, StateVectorReactor)])
+
+    @property
+    def interfaces(self) -> list[InterfaceReactor]:
+        """Its interfaces, in the order of the reactors."""
+        return [reactor for reactor in self.reactors if isinstance(reactor, InterfaceReactor)]
 
     @cached_property
     def _watch(self) -> StepWatcher:
         return StepWatcher(self, self.interfaces)
+
+    @property
+    def initial_time(self) -> float:
+        """Time at which the integration begins [s]; to be set before."""
+        return float(super().initial_time)
+
+    @initial_time.setter
+    def initial_time(self, t: float) -> None:
+        if not self._fresh and self.interfaces:
+            raise InputError("the network has run, and its interfaces with it: begin at another time with new ones.")
+        self._set_clock(t)
+
+    def _set_clock(self, t: float) -> None:
+        cantera_time: Any = cantera.ReactorNet.initial_time
+        cantera_time.__set__(self, t)
 
     def advance(self, t: float, apply_limit: bool = True) -> float:
         """Advance to a time, or to where a variable has changed by its advance limit.
@@ -138,8 +159,9 @@ class ReactorNet(cantera.ReactorNet):
 
         Just after a start, a time within rounding is reached by setting the clock, since CVODE takes no step as short.
         """
-        if self.time == self._started and 0 < goal - self.time <= LATER_AHEAD * np.spacing(goal):
-            self.initial_time = self._started = goal
+        if self.time == self._started and 0 < goal - self.time <= LATER_AHEAD * np.spacing(abs(goal)):
+            self._set_clock(goal)
+            self._started = goal
         return bool(self.time >= goal)
 
     def _limited(self, now: float, end: float, start: Array) -> float:

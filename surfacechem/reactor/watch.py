@@ -121,9 +121,11 @@ class StepWatcher:
         now = float(self.net.time)
         self._before = [item.scene.transitions(now, item.x) for item in self.interfaces]
         if self.started:
-            return min(goal, now + LATER_AHEAD * float(np.spacing(now)))
+            return min(goal, now + LATER_AHEAD * float(np.spacing(abs(now))))
         soonest = min((item.scene.events.soonest() for item in self.interfaces if item.scene.events), default=np.inf)
-        return min(goal, now + max(min(FIRST_AHEAD * (goal - now), soonest / 2), MIN_AHEAD * float(np.spacing(now))))
+        return min(
+            goal, now + max(min(FIRST_AHEAD * (goal - now), soonest / 2), MIN_AHEAD * float(np.spacing(abs(now))))
+        )
 
     def locate_event(self) -> None:
         """Locate the first event in the step that the integrator has just taken."""
@@ -143,7 +145,7 @@ class StepWatcher:
                 t, fired = first_crossing(step, guards, np.isfinite(present), 0.0)
             if fired and (self.event is None or t < self.event.t):
                 self.event = InterfaceEvent(t, item, fired[0])
-        if self._is_coupled:
+        if self._halves and self._is_coupled:  # the guards have displaced the reactors
             self.go(now)
 
     def _guards_of(self, item: InterfaceReactor) -> Callable[[float, Array], Array]:

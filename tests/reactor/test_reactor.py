@@ -369,6 +369,12 @@ run: {until: 100 s}
 """
 
 
+def test_an_interface_is_no_sequence():
+    """Python would ask it for the quantities 0, 1, 2."""
+    with pytest.raises(TypeError, match="'InterfaceReactor' object is not iterable"):
+        ReactorNet(InterfaceReactor("exothermic"))
+
+
 def test_what_cantera_holds_stays_alive():
     """Cantera's part is made before the reactor is, and must not be collected in between."""
     threshold = gc.get_threshold()
@@ -441,6 +447,25 @@ def test_a_network_may_begin_at_any_time(kind):
         net.rtol, net.initial_time = RTOL, start
         net.advance(start + 0.8)
     assert later.x == pytest.approx(at_once.x, rel=LOOSE)
+
+
+@pytest.mark.parametrize("end", [0.0, 0.5])
+def test_a_network_may_begin_before_zero(end):
+    later, at_once = (InterfaceReactor("dna-adhesive") for _ in range(2))
+    for interface, start in ((later, -1.0), (at_once, 0.0)):
+        net = ReactorNet([interface])
+        net.rtol, net.initial_time = RTOL, start
+        net.advance(start + 1.0 + end)
+    assert later.x[:5] == pytest.approx(at_once.x[:5], rel=LOOSE)
+    assert list(later.dataset["time"].values) == [-1.0, end]
+
+
+def test_reactors_from_a_generator():
+    """Cantera uses it up."""
+    net = ReactorNet(InterfaceReactor(case) for case in ("stick-slip", "exothermic"))
+    net.advance(0.7)
+    assert [each.name for each in net.interfaces] == ["interface", "interface_2"]
+    assert len(net.interfaces[0].scene.events.jumps) == 2
 
 
 @pytest.mark.parametrize("kind", [ReactorNet, ct.ReactorNet])
@@ -644,6 +669,14 @@ REFUSED = [
     (lambda *_: InterfaceReactor("slow-passage").load("F_m", 1.0), "network can give. Did you mean 'F_n'"),
     (lambda *_: InterfaceReactor("slow-passage").load("F_t2", 1.0), "nothing of the scene reads the load F_t2"),
     (lambda *_: InterfaceReactor(PISTON).load("F_n", None), "F_n needs a pressure"),
+    (
+        lambda *_: InterfaceReactor(PISTON).load("F_n", lambda t: None),
+        "F_n is a number in SI at each time; .* it is None",
+    ),
+    (lambda *_: InterfaceReactor(PISTON).load("F_n", lambda t: "1 Pa"), "at t = 0 s it is '1 Pa'"),
+    (lambda *_: InterfaceReactor(PISTON).load("F_n", lambda t: math.nan), "the load F_n is nan at the start"),
+    (lambda _, i: run(i, i), "interface stands 2 times in the list of reactors"),
+    (lambda _, i: (net := ReactorNet([i]), net.advance(0.1), setattr(net, "initial_time", 0.2)), "with new ones"),
     (lambda gas, _: InterfaceReactor("exothermic").press(gas, gas), "a gap that has a rate of its own"),
 ]
 
