@@ -185,8 +185,10 @@ RELATIVE_INERTIA = 1e-14
 a thousand times slower is right to DEFAULT_RTOL, that of the reference to NEWTON_EPS, rounded down.
 """
 
-LEAST_CREEP = 1e-25
-"""Least velocity [m/s] that counts in friction with a state: creep at rest is tens of decades slower than sliding."""
+LEAST_CREEP = 1e-19
+"""Fraction of the reference velocity of friction with a state that counts: the creep at rest, exp(-mu / a) of it at a
+coefficient mu of 0.6 and a direct effect a of 0.014.
+"""
 
 ZERO_TIME = 1e-100
 """Time [s] that counts as zero: a rate at the cap of an exponent, 1e130 times its prefactor, acts within it."""

@@ -35,6 +35,10 @@ RTOL_PATH = "run.rtol"
 """Path of the relative tolerance of a run, which sets where endless sequences of events are cut off."""
 
 
+END_PATH = "run.t_end"
+"""Path of the end of a run [s], the scale for brief times; one second where no run is planned."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A run-time number of the compiled scene: a parameter of a law, a mode, a register or a segment's field."""

@@ -510,7 +510,7 @@ class Model:
         """
         system, end = self.system, run.times[-1]
         segments = pieces.segments(system, end, values)
-        parameters = pieces.segment_parameters(system, segments[:-1], run.rtol, values)
+        parameters = pieces.segment_parameters(system, segments, run.rtol, values)
         if passing:
             fastest = max((values[path] for path in system.cycles), default=0.0)
             segments, parameters = self.passing.pieces(segments, parameters, fastest, run.max_steps)

@@ -16,7 +16,7 @@ import symengine
 
 from surfacechem.compile.program import Function, compile_function, needed
 from surfacechem.expressions import Expression, derivative
-from surfacechem.model.system import RTOL_PATH, System
+from surfacechem.model.system import END_PATH, RTOL_PATH, System
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import FEW_EPS, GUARD_EPS, NEGLIGIBLE
 
@@ -44,8 +44,9 @@ def segments(system: System, end: float, values: Mapping[str, float]) -> Array:
     return np.array(sorted({0.0, *(t for t in inside if t < end), end}))
 
 
-def segment_parameters(system: System, starts: Array, rtol: float, values: Mapping[str, float]) -> Array:
+def segment_parameters(system: System, segments: Array, rtol: float, values: Mapping[str, float]) -> Array:
     """Return the parameters of each segment: loads as they start it, bounds with the slack that the tolerance needs."""
+    starts = segments[:-1]
     rows = np.repeat([[values[parameter.path] for parameter in system.parameters]], len(starts), axis=0)
     for j, parameter in enumerate(system.parameters):
         if parameter.load is not None:
@@ -54,6 +55,8 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
             rows[:, j] = min(max(values[parameter.path], BETWEEN_POINTS * rtol), LARGEST_SLACK)
         elif parameter.path == RTOL_PATH:
             rows[:, j] = rtol
+        elif parameter.path == END_PATH:
+            rows[:, j] = segments[-1]
     return rows
 
 

@@ -286,3 +286,22 @@ def test_films_relax_at_their_own_rates():
         close(solved["u_t"], 1e-3 * (1 - np.exp(-k * g / along * times)))
         close(solved["u_t2"], -2e-3 * (1 - np.exp(-k * g / across * times)))
         close(solved["t_t2"], k * (-2e-3 - solved["u_t2"]), 1e-9)
+
+
+DRIVEN = {"w_t": (2e-6, 0.0), "w_t2": (1.5e-6, 1.0)}
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e-3, 1e3, 1e9])
+@pytest.mark.parametrize("drive", ["spring", "push"])
+def test_a_path_is_the_same_in_any_unit_of_length(drive, length):
+    """From rest at the start on, where neither time nor friction has made a speed."""
+
+    def path(unit):
+        waves = {x: Harmonic(amplitude=a * unit, frequency=1.0, phase=b) for x, (a, b) in DRIVEN.items()}
+        pushes = {"F_t": Ramp(rate=10.0), "F_t2": Hold(level=7.0)}
+        mount = Mounting(k=1e8 / unit if drive == "spring" else 0.0, m=1e6 / unit)
+        loads = {"p": 100.0, **waves} if drive == "spring" else {"p": 20.0, **pushes}
+        found = closed(scene([Coulomb(mu=0.3)], mount, **loads), 2.0, outputs=41, atol=1e-23 * unit)
+        return np.array([found[x] for x in ("u_t", "u_t2", "v", "v_2")]) / unit
+
+    close(path(length), path(1.0), 1e-10)

@@ -11,7 +11,7 @@ from solved import solve
 import surfacechem
 from surfacechem.contracts.terms import Varying
 from surfacechem.errors import InputError
-from surfacechem.laws.factors import LinearInTemperature
+from surfacechem.laws.factors import Linear, LinearInTemperature
 from surfacechem.laws.free_energy import TangentialStiffness
 from surfacechem.laws.friction import Coulomb, RateAndStateAging, RateAndStateSlip
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
@@ -205,3 +205,21 @@ def test_creep_with_a_mass_is_the_same_in_all_units(law):
     for u, drive in found[1:]:
         np.testing.assert_allclose(u, found[0][0], rtol=0, atol=1e-10 * np.max(np.abs(u)))
         np.testing.assert_allclose(drive, found[0][1], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e-6, 1e3, 1e9])
+def test_creep_from_rest_is_the_same_in_any_unit_of_length(length):
+    """The velocity itself is the unknown where a parameter varies with it; it begins 24 decades below its guess."""
+
+    def creep(unit):
+        direct = Varying(0.012, (Linear(of="v", slope=100.0 / unit),))
+        numbers = {"mu_0": 0.6, "a": direct, "b": 0.008, "L": 1e-5 * unit, "v_0": 1e-6 * unit}
+        mount, drive = Mounting(k=2e10 / unit, c_b=1e8 / unit), {"w_t": Ramp(rate=1e-6 * unit)}
+        made = scene(RateAndStateAging, mount, drive, numbers, {"v": 1e-6 * unit}, Hold(level=1e6))
+        run = solved(made, 60.0, 21)
+        return run["v"] / unit, run.result.counters.steps
+
+    (found, steps), (metres, least) = creep(length), creep(1.0)
+    assert metres[0] == pytest.approx(2e-6 * np.exp(-0.6 / 0.012) * np.sinh(100 / 0.012e6), rel=1e-9)
+    np.testing.assert_allclose(found, metres, rtol=1e-9)
+    assert steps < 1.2 * least

@@ -195,7 +195,9 @@ def evolve(
 ) -> Expression:
     """Add a state of the motion; if ``by`` names what determines it, also a variable of its name."""
     initial = build.scene.initial.get(name, 0.0) if start is None else start
-    finest = LEAST_CREEP if name == "v" and any(law.internal for law in build.interface.frictions) else None
+    creeping = [law for law in build.interface.frictions if name == "v" and law.reference_velocity]
+    speeds = [getattr(law.at_reference(), law.reference_velocity) for law in creeping]
+    finest = LEAST_CREEP * min(speeds) if speeds else None
     state = State(VARIABLES[name], initial, scale, algebraic, finest=finest, given=given)
     build.add(state)
     if by:

@@ -7,9 +7,9 @@ With :math:`f` the driving traction less the resistance,
 
 The first equation is regular as slip stops, so that a stop is the zero of a smooth function. The second is singular:
 unless driven straight, the velocity turns ever faster into its last direction. In it s therefore counts as no less than
-the speed that friction takes away within the rounding of time. That bends the path at such speeds and takes no energy,
-since turning does no work. Without a mass both equations are balances, which dampers close; springs alone would leave
-the speed undetermined.
+the speed that friction takes away within the rounding of time, and that all tractions make in that of a brief part of
+the run. That bends the path at such speeds and takes no energy, since turning does no work. Without a mass both
+equations are balances, which dampers close; springs alone would leave the speed undetermined.
 
 Friction over all directions is an ellipse of tractions, and sticking bears its interior. Slip begins in the direction
 whose friction equals the pull.
@@ -28,6 +28,7 @@ from typing import Any
 
 import symengine
 
+from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, cos, depends, derivative, norm, sin, sqrt, where
 from surfacechem.model.automaton import ZERO, Constraint, Mode, Register
@@ -35,16 +36,16 @@ from surfacechem.model.build import Build, Record
 from surfacechem.model.components.formulation import PLACE, Formulation, evolve, growth, name_traction
 from surfacechem.model.components.mounting import ACROSS, Direction, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
-from surfacechem.model.system import STABLE_PREFIX, Given, Margin
+from surfacechem.model.system import END_PATH, STABLE_PREFIX, Given, Margin
 from surfacechem.quantities import VARIABLES
-from surfacechem.tolerances import PICOMETRE, RUN_EPS, SQRT_EPS, TIME_EPS, TINY, TRACTION_EPS
+from surfacechem.tolerances import BRIEF_PART, RUN_EPS, SQRT_EPS, TIME_EPS, TINY, TRACTION_EPS
 
 SPEED, TURN = symengine.symbols("speed turn")
 BEGAN = symengine.symbols("began began_2")
 STICK_WORDS = {0.0: "sticks", 1.0: "slides"}
 
-LEAST_SPEED = PICOMETRE / 1e6
-"""Speed [m/s] below which the turn is never resolved, a picometre in twelve days: it keeps the row regular at t = 0."""
+LEAST_SPEED = TINY**0.5
+"""Least speed [m/s] in the turn where no traction acts: its square is still a normal number."""
 
 TURN_SCALE = 1e6
 """Scale of the turn [rad]. Its absolute error counts, relative to one radian, and the turn that roundoff of the pull
@@ -165,7 +166,9 @@ def _inertial(build: Build, sides: Sequence[Component], largest: Expression) -> 
     (x, y), (c, s) = (side.driving for side in sides), _unit_vector()
     along, across = c * x + s * y, c * y - s * x
     # The speed that friction takes away within the rounding of time is the least speed in the turn.
-    least = TIME_EPS * largest / m * build.t + LEAST_SPEED
+    end = build.constant("t_end", END_PATH, Spec("s", "end of the run"), 1.0, internal=True)
+    acting = sum((side.far.size(side.u) + absolute(side.t_a) for side in sides), ZERO)
+    least = TIME_EPS * (largest * build.t + BRIEF_PART * acting * end) / m + LEAST_SPEED
     build.rows.momentum("speed", along, m, SLIP)
     build.rows.switched("turn", SLIP, sqrt(SPEED**2 + least**2) * turn - across / m, turn)
     return SPEED + TRACTION_EPS / TIME_EPS * least

@@ -49,22 +49,23 @@ def _fold(w: Any) -> bool:
 
 @compiled
 def _factor(w: Any) -> bool:
-    """Factor the matrix of the unknowns, each column in units of its largest entry relative to that entry's row."""
+    """Factor the matrix of the unknowns, each column in units of the sum of its entries relative to their rows."""
     n = w.core
     evaluate_jacobian(w)
     for i in range(n):
         for j in range(n):
             w.real[i, j] = w.jacobian[0 if w.algebraic[j] else 1, i, j]
-    # Unknowns may differ by forty decades, and so may equations: compare entries relative to their rows.
+    # Unknowns may differ by forty decades, and so may equations: compare entries relative to their rows. By the sum an
+    # equation of one unknown is its pivot, rather than an equation in which it is the largest of several.
     for i in range(n):
         w.delta[i] = 0.0
         for j in range(n):
             w.delta[i] = max(w.delta[i], abs(w.real[i, j]))
     for j in range(n):
-        largest = 0.0
+        total = 0.0
         for i in range(n):
-            largest = max(largest, abs(w.real[i, j]) / w.delta[i] if w.delta[i] > 0.0 else 0.0)
-        w.columns[j] = 1.0 / largest if largest > 0.0 else 1.0
+            total += abs(w.real[i, j]) / w.delta[i] if w.delta[i] > 0.0 else 0.0
+        w.columns[j] = 1.0 / total if total > 0.0 else 1.0
     if w.links > 0 and not _fold(w):
         return False
     return bool(factor(w.real, w.order[0], w.places[0], w.columns, w.delta, w.entries, SMALLEST_PIVOT))
