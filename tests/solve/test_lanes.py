@@ -156,6 +156,15 @@ def test_a_step_onto_a_guard_that_fails_is_given_up(left):
     assert found.ends[:, 0] == pytest.approx(wanted.ends[:, 0], rel=1e-5)
 
 
+def test_a_singular_start_takes_as_many_trials_as_time_resolves(left):
+    """The production of entropy begins like the logarithm of a coverage, which no quadrature resolves."""
+    problem, columns = arrays_of(case_runs.load("l-selectin-tether"), implicit=True)
+    tight = replace(problem, rtol=1e-11, atol=1e-2 * problem.atol)
+    found = lane_batch.solve_batch(tight, *columns)
+    assert left[0] == 0
+    assert_alike(found, solve_arrays(tight, *columns), problem.program.n, 1e-10)
+
+
 def test_runs_without_guards(left):
     problem = replace(exothermic_problem(1e-9), explicit=True)
     one = problem.y0, problem.parameters, np.array(0.1), np.zeros(0), problem.segments, problem.times

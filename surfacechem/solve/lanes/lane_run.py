@@ -30,8 +30,10 @@ from surfacechem.solve.radau.work import MARGINS, RATES, compiled, evaluate, row
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 
 FINISHED, EVENT, LEFT = int(Status.FINISHED), int(Status.EVENT), int(Status.LEFT)
-MOST_TRIALS = 12
-"""Rejected trials in a row, each at most half as long as the last, after which the cause is noise or stiffness."""
+MOST_TRIALS = 16
+"""Rejected trials in a row after which the cause is noise or stiffness. At a singular start, where each is a tenth of
+the last, they reach the shortest steps that matter.
+"""
 CONSTANTS = RATES + 1
 """Row of the constants in the table of addresses."""
 FREE_LANES = 4
