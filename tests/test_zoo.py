@@ -180,6 +180,7 @@ def test_the_error_of_a_case_follows_its_tolerance_in_few_steps(name):
         solution = simulation.run(run=replace(simulation.case.run, rtol=rtol, accuracy=None))
         assert solution.status == ("stopped" if name in STOPPED else "finished")
         assert solution.accuracy.error < FOLLOWING.get(name, 100) * rtol
+        assert solution.audit.violations == ()
         assert solution.trajectory.result.counters.steps < 400
 
 

@@ -4,7 +4,6 @@ import dataclasses
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
-import cantera as ct
 import numpy as np
 import pytest
 
@@ -45,12 +44,6 @@ heat:
 T_0: 298.15 K
 initial: {T_1: 298.15 K, T_2: 345 K, T_c: 298.15 K, coverages: {free(s): 1}}
 run: {until: 30 ms, outputs: 11, solver: cantera, rtol: 1e-8}
-"""
-ISOTHERMAL = """
-bodies: {lower: {temperature: 350 K}, upper: {temperature: 350 K}}
-interface: {temperature: 350 K, mechanism: {file: film.yaml, bonds: [bond(s)]}}
-initial: {coverages: {free(s): 1}}
-run: {until: 1 ms, outputs: 41, solver: cantera, rtol: 1e-9}
 """
 EXTENSION = """
 import math
@@ -108,18 +101,6 @@ def test_as_if_it_were_lowered(case):
     assert evaluated.audit.energy_error < 1e-10
     assert evaluated.audit.site_error < 100 * 1e-8  # its tolerance
     assert evaluated.audit.violations == ()
-
-
-def test_blowers_masel_at_constant_temperature(case):
-    """One reversible first-order reaction: an exponential with Cantera's own coefficients."""
-    solution = surfacechem.run(case(BLOWERS_MASEL, ISOTHERMAL))
-    surface = ct.Interface(yaml=MECHANISM + BLOWERS_MASEL, name="film")
-    surface.TP = 350.0, ct.one_atm
-    forward, reverse = surface.forward_rate_constants[0], surface.reverse_rate_constants[0]
-    t = solution.dataset["time"].values
-    exact = forward / (forward + reverse) * -np.expm1(-(forward + reverse) * t)
-    assert 0.1 < exact[-1] < 0.99
-    np.testing.assert_allclose(solution.dataset["phi"].values, exact, atol=1e-6, rtol=0)
 
 
 def test_a_compiled_solver_cannot_ask(case):

@@ -82,22 +82,6 @@ def test_springs_know_their_energy(name, file):
     assert solution.warnings == ()
 
 
-def test_the_run_says_how_far_a_pair_departs(file):
-    """At every moment of a pull, and in words at its end."""
-    path = file("Bell")
-    solution = surfacechem.load(path.with_name("case.yaml")).run()
-    dataset = solution.dataset
-    f = dataset.f_theta_bond_s
-    np.testing.assert_allclose(f, STIFFNESS * (dataset.g_n - REST), rtol=1e-12, atol=1e-25)
-    expected = f * 0.6e-9 / KT - f**2 / (2 * STIFFNESS * KT)
-    np.testing.assert_allclose(dataset.departure_R1_R2, expected, rtol=1e-10, atol=1e-11)
-    worst = float(expected[np.argmax(np.abs(expected.values))])
-    assert (
-        f"departs from the equilibrium constant K(g, T) by a factor exp({worst:.3g}) at most"
-        in solution.attributes["detailed_balance"]
-    )
-
-
 def test_a_direction_that_is_switched_off_is_shown(file):
     path = file("Bell")
     path.write_text(path.read_text().replace("A: 10.0", "A: 0.0"), encoding="utf-8")

@@ -144,7 +144,7 @@ def test_the_file_itself_is_read(name, file):
 
 @pytest.mark.parametrize("name", WHOLE)
 @given(data=st.data())
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_a_misspelt_key_is_named(name, file, data):
     path = data.draw(st.sampled_from(list(keys(PLAIN[name]))))
     new = data.draw(misspelt(str(path[-1])).filter(lambda word: word.strip() and word not in siblings(name, path)))
@@ -236,7 +236,7 @@ def refusal(case, folder):
     return None
 
 
-@pytest.mark.parametrize("examples", [25, pytest.param(3000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("examples", [15, pytest.param(3000, marks=pytest.mark.slow)])
 def test_mutated_documents(examples, file):
     @given(name=st.sampled_from(list(TEXTS)), data=st.data())
     @settings(max_examples=examples, derandomize=True, suppress_health_check=list(HealthCheck))
@@ -249,7 +249,7 @@ def test_mutated_documents(examples, file):
     run()
 
 
-@pytest.mark.parametrize("examples", [25, pytest.param(3000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("examples", [15, pytest.param(3000, marks=pytest.mark.slow)])
 def test_mutated_texts(examples, file):
     @given(name=st.sampled_from(list(TEXTS)), data=st.data())
     @settings(max_examples=examples, derandomize=True, suppress_health_check=list(HealthCheck))

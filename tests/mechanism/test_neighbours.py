@@ -210,18 +210,6 @@ def test_a_run_again_from_its_file(tmp_path):
     assert rerun.differences(record, rerun.run_again(record)) == []
 
 
-def test_in_a_network(tmp_path):
-    which = "sofc.yaml", "oxide_surface"
-    case = written(tmp_path, which, ADIABATIC)
-    solution = surfacechem.load(case).run(error="balances")
-    interface = InterfaceReactor(case)
-    net = ReactorNet([interface])
-    net.rtol, net.atol = 1e-10, 1e-18
-    net.advance(CASES[which].until)
-    found = [interface[state.name] for state in solution.trajectory.model.system.states]
-    assert found == pytest.approx(solution.trajectory.result.outputs[-1], rel=1e-6, abs=1e-12)
-
-
 @dataclass(frozen=True)
 class Changing:
     """Neighbours whose state is a history, and what it is at a time."""

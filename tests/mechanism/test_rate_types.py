@@ -193,30 +193,6 @@ def test_two_bond_species_share_the_load_by_their_stiffness(tmp_path):
     assert "f" not in columns
 
 
-def test_two_bound_states_make_a_catch_bond(tmp_path):
-    """Force moves bonds from the weak to the strong state: they live longer at a moderate force than at none."""
-    strong = species("strong", -20.0, -30.0)
-    steps = [
-        {"equation": "free => bond", "rate-constant": {**RATE, "A": 0.0}},
-        reaction("bond => free", "Bell", {"x-beta": "0.1 nm"}, {**RATE, "A": 5.0}),
-        reaction("strong => free", "Bell", {"x-beta": "0.2 nm"}, {**RATE, "A": 0.05}),
-        reaction("bond => strong", "Bell", {"x-beta": "1 nm"}, {**RATE, "A": 0.5}),
-        reaction("strong => bond", "Bell", {"x-beta": "-1 nm"}, {**RATE, "A": 5.0}),
-    ]
-    read = mechanism(tmp_path, steps, others=[strong])
-    left = []
-    for f in (0.0, 15e-12, 120e-12):
-        built = scene(read, {"f": Hold(level=f)}, coverages={"bond": 1.0})
-        left.append(1 - solved(built, [0.0, 1.0]).result.outputs[-1, 0])
-        work = f / (BOLTZMANN * 300.0)
-        k = [A * math.exp(x * work) for A, x in ((5.0, 1e-10), (0.05, 2e-10), (0.5, 1e-9), (5.0, -1e-9))]
-        matrix = np.array([[-k[0] - k[2], k[3]], [k[2], -k[1] - k[3]]])
-        w, v = np.linalg.eig(matrix)
-        exact = (v @ np.diag(np.exp(w)) @ np.linalg.inv(v))[:, 0].sum()
-        assert left[-1] == pytest.approx(exact, rel=1e-8, abs=1e-14)
-    assert left[1] > left[0] > left[2]
-
-
 def test_a_load_that_all_bonds_share_breaks_them(tmp_path):
     """Two bond species without springs carry the same force; the run ends where they cannot."""
     other = species("other", -20.0, -30.0)

@@ -69,18 +69,6 @@ def test_a_capacity_that_vanishes_on_the_way_ends_the_run():
     assert trajectory.result.t == pytest.approx((0.9 - lost) / 0.1, rel=1e-3)
 
 
-def test_bonding_ends_at_the_sites_of_the_poorer_side():
-    sites = Sites(1e18, 4e17, 1)
-    pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
-    interface = Interface(Hold(level=300.0), [BondEnergy(K_0=1.0)], (), [Relaxation(tau=1.0)], sites)
-    trajectory = run(Scene(pair, interface, initial={"phi": 0.0}, T_0=300.0), 10.0)
-    (complete,) = trajectory.jumps
-    assert complete.edge.name == "complete"
-    assert complete.t == pytest.approx(-math.log(0.6), rel=1e-9)
-    assert trajectory.status == "finished"
-    assert trajectory.result.y[0] == 0.4
-
-
 def test_the_choice_of_the_reference_side_changes_phi_but_not_the_bonds():
     def bonds(reference: int) -> float:
         sites = Sites(1e18, 2e18, reference)

@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 
 import surfacechem
 from surfacechem import format as cases
-from surfacechem import plots
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
 from surfacechem.references import get
@@ -169,16 +168,6 @@ def test_no_errors_are_found_where_no_runs_are_checked(tmp_path, monkeypatch):
 def test_a_sweep_can_be_run_again_from_its_file(spectrum, tmp_path):
     record = rerun.read(spectrum.write(tmp_path / "spectrum.nc"))
     assert rerun.differences(record, rerun.run_again(record)) == []
-
-
-@pytest.mark.parametrize("excess", [1e-1, 1e-4])
-def test_lifetime_above_the_critical_load(excess):
-    kind = get("rebinding-cluster")
-    given = {"k_off": 0.5, "k_on": 0.5, "x_off": 4e-10, "T": 300.0, "n_c": 1e14}
-    t_n = kind(**given, t_n=1.0).critical_traction * (1 + excess)
-    case = surfacechem.load("adhesion-cluster", {"loading.t_n": t_n, "run.until": "1000 s"})
-    reached = case.run().trajectory.result.t
-    assert reached == pytest.approx(kind(**given, t_n=t_n).end_time, rel=1e-8)
 
 
 def test_survival_down_to_1e_282():
@@ -344,16 +333,6 @@ def test_a_case_without_a_sweep(bonding):
         bonding.sweep()
     with pytest.raises(InputError, match="unknown key 'ovr'"):
         cases.load("exothermic", {"sweep": {"ovr": {}}})
-
-
-def test_figure_of_final_values(bonding):
-    plot = plots.figure(bonding.sweep({"initial.T": [280.0, 300.0], K_0: [100.0, 200.0, 300.0]}).dataset)
-    assert [ax.get_ylabel() for ax in plot.axes] == ["Final $T$ [K]", "Final $\\phi$ [1]"]
-    ax = plot.axes[0]
-    assert len(ax.get_lines()) == 3
-    assert ax.get_legend().get_texts()[0].get_text() == "$K_{0}$ = 100 J m⁻²"
-    with pytest.raises(InputError, match="no variable 'x' in the sweep"):
-        plots.figure(bonding.sweep({K_0: [1.0]}).dataset, ["x"])
 
 
 def test_command_line(tmp_path, monkeypatch):
