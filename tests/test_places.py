@@ -1,8 +1,8 @@
 """How many places one touches to add something: each addition is made in a copy of the package, and runs there.
 
-A law, a rate type, an exact solution, an output, a component, a constraint and the solver of a library are one file
-each. A key of a case is tested in ``format/test_declarations.py``, the law of the page "Adding a law" in
-``test_docs.py``.
+A rate type, an output, a component, a constraint and the solver of a library are one file each. So are a law, that of
+the page "Adding a law" in ``test_docs.py``, and an exact solution, in ``references/test_references_registry.py``; a key
+of a case is one line, in ``format/test_declarations.py``.
 """
 
 import json
@@ -34,22 +34,11 @@ RUN = """
 import json, surfacechem
 solution = surfacechem.run("case.yaml")
 end = {column.name: float(column.values[-1]) for column in solution.columns if column.dimensions == ("time",)}
-text = f"{solution.reason} {solution.audit.violations} {solution.accuracy and solution.accuracy.source}"
+text = f"{solution.reason} {solution.audit.violations}"
 print(json.dumps({**end, "text": text}))
 """
 V_I, M, MU_P, T_I, C = 2.0, 5.0, 0.25 * 30e3, 300.0, 100.0
 
-LAW = '''
-
-class Drag(Friction):
-    r"""Resistance in proportion to the velocity. .. math:: t_t = c v"""
-
-    c: float = parameter("Pa s/m", "resistance", at_least=0)
-
-    def traction(self, v: Expression) -> Expression:
-        """Tangential traction [Pa]."""
-        return self.c * v
-'''
 FACTOR = '''
 
 class Steep(BondRates):
@@ -81,27 +70,6 @@ species:
 reactions:
 - {equation: bond => free, type: steep, rate-constant: {A: 3 1/s, b: 0, Ea: 0}, x: 1 nm}
 """
-SOLUTION = '''
-"""A slider that friction brakes, before it rests."""
-
-from surfacechem.contracts.terms import parameter
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
-
-
-class EarlyBraking(Reference):
-    """A velocity that falls at a constant rate."""
-
-    v_i: float = parameter("m/s", "initial velocity")
-    a: float = parameter("m/s^2", "deceleration")
-
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        force = scene.read("friction", "mu") * scene.initial("p")
-        return {"v_i": scene.initial("v"), "a": force / scene.read("tangential", "m")}
-
-    def quantities(self, t: Array) -> Quantities:
-        return {"v": self.v_i - self.a * t, "u_t": self.v_i * t - self.a * t**2 / 2}
-'''
 COMPONENT = '''
 """A body that is cooled."""
 
@@ -152,18 +120,8 @@ class Place(NamedTuple):
 
 
 PLACES = {
-    "a law": Place(
-        {"laws/friction.py": ("", LAW)},
-        {"coulomb: {mu: 0.25}": "drag: {c: 5 kPa s/m}"},
-        {"v": V_I * math.exp(-5e3 * 1e-3 / M)},
-    ),
     "a rate type": Place(
         {"laws/kinetics.py": ("", FACTOR)}, {}, {"rate": 1.5 * math.exp(2e-12 * 1e-9 / (1.380649e-23 * 300.0))}, RATE
-    ),
-    "an exact solution": Place(
-        {"references/early_braking.py": ("", SOLUTION)},
-        {"run:": "reference: early-braking\nrun:"},
-        {"text": "exact solution early-braking", "v": V_I - MU_P / M * 1e-3},
     ),
     "an output": Place(
         {
@@ -193,7 +151,7 @@ PLACES = {
 }
 
 
-TOGETHER = (("a law", "a rate type", "an exact solution", "an output", "a solver"), ("a component", "a constraint"))
+TOGETHER = (("a rate type", "an output", "a solver"), ("a component", "a constraint"))
 """Additions that do not meet in a case share a copy of the package."""
 
 

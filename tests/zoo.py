@@ -73,10 +73,13 @@ def _members() -> Iterator[Member]:
 MEMBERS = {(member.name if "scene" in member.tags else f"case {member.name}"): member for member in _members()}
 
 
-def each(*tags: str) -> Any:
-    """Parametrise ``member`` by those that have all tags."""
-    found = [pytest.param(m, id=name) for name, m in MEMBERS.items() if {*tags} <= m.tags]
-    return pytest.mark.parametrize("member", found)
+def each(*tags: str, cases: int = 1) -> Any:
+    """Parametrise ``member`` by those that have all tags; one of so many cases is quick, the others are slow."""
+    chosen = {name: member for name, member in MEMBERS.items() if {*tags} <= member.tags}
+    shipped = [name for name, member in chosen.items() if "case" in member.tags]
+    slow = {name for k, name in enumerate(shipped) if k % cases}
+    marks = {name: [pytest.mark.slow] if name in slow else [] for name in chosen}
+    return pytest.mark.parametrize("member", [pytest.param(m, id=n, marks=marks[n]) for n, m in chosen.items()])
 
 
 def pairwise(first: Sequence[Any], second: Sequence[Any], third: Sequence[Any]) -> list[tuple[Any, Any, Any]]:

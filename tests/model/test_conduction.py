@@ -232,7 +232,7 @@ def test_an_exact_solution_of_another_scene_is_not_used():
         "the heat capacity of glass varies": ["bodies.glass.capacity=quadratic"],
         "the conductivity of glass varies": [f"bodies.glass.conduction.conductivity={varying}"],
     }
-    cells = [f"bodies.{name}.conduction.cells=8" for name in ("epoxy", "glass")]
+    cells = [f"bodies.{name}.conduction.cells={{accuracy: 1e-2}}" for name in ("epoxy", "glass")]
     for reason, change in cases.items():
         source = surfacechem.run("sudden-contact", [*cells, *change, "run.until=1 s"]).accuracy.source
         assert reason in source

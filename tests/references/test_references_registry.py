@@ -113,17 +113,3 @@ def test_an_exact_solution_is_added_by_its_file_alone(added):
     made = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(made)
     assert "## `newton-cooling` { #newton-cooling }" in made.made_references()
-
-
-@pytest.mark.parametrize(
-    ("change", "reason"),
-    [
-        ("bodies.body.capacity=quadratic", "it misses the equation of T_1 by"),
-        ("heat=[radiation: {between: [body, reservoir], epsilon_1: 0.9}]", "it needs h (conductance"),
-        ("reference={name: newton-cooling, h: 44}", "it is given for h = 44 W/(m^2 K); the scene has 40 W/(m^2 K)."),
-    ],
-)
-def test_an_added_solution_is_of_its_own_scene_only(added, change, reason):
-    source = surfacechem.run("reservoir-exchange", [*CHANGES, change]).accuracy.source
-    assert "the exact solution newton-cooling does not apply to this scene" in source
-    assert reason in source

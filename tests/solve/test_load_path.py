@@ -180,22 +180,6 @@ def test_what_slides_sticks_where_the_pressure_jumps_up(static, start, again, so
         assert at(solution, "t_t", t) == pytest.approx(1e9 * (0.25e-3 * t - u), rel=1e-9)
 
 
-def test_what_slides_jumps_on_where_the_pressure_jumps_down():
-    solution = slider(f"{FALLS}, {PULLED}", solver=LIBRARY)
-    assert events(solution) == [("slip forward", pytest.approx(4.0)), ("load", 5.0)]
-    assert released(solution) == pytest.approx([(1e6**2 - 0.5e6**2) / 2e9], rel=1e-9)
-    for t, u in ((4.5, 0.125e-3), (5.25, 0.8125e-3), (6.0, 1e-3)):
-        assert at(solution, "u_t", t) == pytest.approx(u, rel=1e-9)
-
-
-def test_a_shear_traction_that_jumps_moves_what_sticks_elastically():
-    shear = "p: 1 MPa, w_t: 0, F_t: {table: {times: [0, 3, 3, 10], values: [0, 0.1 MPa, 0.6 MPa, 0.6 MPa]}}"
-    solution = slider(shear, SPRING % "1e9", outputs=7)
-    assert at(solution, "u_t", 4.0) == pytest.approx(300e-6, rel=1e-11)
-    assert at(solution, "t_t", 4.0) == pytest.approx(0.3e6, rel=1e-11)
-    assert released(solution) == pytest.approx([62.5], rel=1e-11)
-
-
 def test_a_debonding_that_raises_the_limit_lets_what_slides_stick():
     text = """
 T_0: 300 K
