@@ -557,6 +557,11 @@ class Section:
         """Return keys in addition to those of the class: for the tree of a section, or all possible ones."""
         return {}
 
+    @property
+    def values(self) -> dict[str, Any]:
+        """Values of the keys that the class declares, by field."""
+        return {declared.attribute: getattr(self, declared.attribute) for declared in keys(type(self)).values()}
+
     def has(self, *names: str) -> bool:
         """True if any of these keys is given."""
         return isinstance(self.tree.value, dict) and any(name in self.tree.value for name in names)

@@ -429,19 +429,7 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
 
     section = named if isinstance(named, MechanismSection) else MechanismSection(file=named)
     file = section.file if Path(section.file).suffix in (".yaml", ".yml") else f"{section.file}.yaml"
-    neighbours = {
-        name: Neighbour(
-            phase.pressure,
-            dict(phase.composition),
-            phase.rest,
-            phase.electric_potential,
-            phase.capacitance,
-            phase.current,
-            place=phase.tree.place,
-        )
-        for name, phase in section.neighbours.items()
-    }
-
+    neighbours = {name: Neighbour(**x.values, place=x.tree.place) for name, x in section.neighbours.items()}
     if content is None:
         path = find(file, base, (tree.value["file"] if isinstance(named, MechanismSection) else tree).place)
         file = str(path)

@@ -112,13 +112,10 @@ def load_mechanism(
     code = sys.version, *map(version, LIBRARIES), *sources
     mark = fingerprint(file, text, phase, list(bonds), evaluate, code)
     path = cache_root() / "mechanisms" / mark.digest[:32]
-    found: Mechanism = from_file(path, load, pickle.loads, _kept_form)
+    found: Mechanism = from_file(
+        path, load, pickle.loads, lambda made: pickle.dumps(made) if made.follows_from_text else None
+    )
     return found
-
-
-def _kept_form(mechanism: Mechanism) -> bytes | None:
-    """Return a mechanism as a file of the cache has it; None if it depends on more than its text."""
-    return pickle.dumps(mechanism) if mechanism.follows_from_text else None
 
 
 def _loaded(
@@ -315,14 +312,9 @@ def _reaction(
         message = f"{title}: {elastic[0]} is elastic, which Cantera's equilibrium constant does not know. "
         raise InputError(f"{message}Write two one-way reactions.", place)
     given |= {"whole": whole, "value": 0.0}
-    if beside := _outside(whole, variables):
+    if beside := {name: nu for name, nu in whole.items() if name not in variables}:
         return NeighbourReaction(enthalpy=0.0, gibbs=0.0, in_neighbours=beside, **given)
     return EvaluatedReaction(**given)
-
-
-def _outside(whole: Mapping[str, float], own: Mapping[str, str]) -> dict[str, float]:
-    """Return the part of a change that belongs to other phases."""
-    return {name: nu for name, nu in whole.items() if name not in own}
 
 
 def _lowered(

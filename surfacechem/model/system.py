@@ -84,7 +84,7 @@ class State:
     start: str = ""
     """Name of the variable that gives its initial value, if not the state itself."""
     finest: float | None = None
-    """Scale by which the absolute tolerance is multiplied, if smaller than ``scale``."""
+    """Its size for the absolute tolerance, if smaller than ``scale``."""
     given: Given | None = None
     """The given initial value of the quantity that the state represents, if any."""
     is_temperature: bool = False
@@ -108,6 +108,11 @@ class State:
     def path(self) -> str:
         """Path of its initial value, or of the quantity that is given instead."""
         return f"initial.{self.given.quantity.name if self.given else self.start or self.name}"
+
+    @property
+    def size(self) -> float:
+        """Scale by which the absolute tolerance is multiplied."""
+        return self.finest or self.scale
 
     @property
     def at_start(self) -> tuple[Quantity, float]:
@@ -406,6 +411,11 @@ class System:
         return frozenset([DUMMY_STATE, *(name for profile in self.profiles for name in profile.states)])
 
     @cached_property
+    def own_states(self) -> dict[str, State]:
+        """States by name, without the interior ones."""
+        return {state.name: state for state in self.states if state.name not in self.interior}
+
+    @cached_property
     def cell_symbols(self) -> frozenset[Any]:
         """Symbols of the states inside bodies and of their rates; each belongs to one cell."""
         cells = self.interior - {DUMMY_STATE}
@@ -468,6 +478,20 @@ class System:
     def output_columns(self) -> dict[str, int]:
         """Columns of the named quantities of the dataset, by name."""
         return {item.name: j for j, item in enumerate(self.outputs)}
+
+    @cached_property
+    def variable_names(self) -> list[str]:
+        """Names of the states and of the named quantities of the dataset."""
+        return [*self.state_columns, *self.output_columns]
+
+    @cached_property
+    def parameter_columns(self) -> dict[str, int]:
+        """Columns of the parameters, by path."""
+        return {parameter.path: j for j, parameter in enumerate(self.parameters)}
+
+    def initial_state(self, values: Mapping[str, float]) -> Array:
+        """Return the initial values of the states, from given values by path."""
+        return np.array([state.from_given(values) for state in self.states])
 
     @cached_property
     def account_columns(self) -> dict[str, list[int]]:

@@ -238,7 +238,7 @@ class EmbeddedScene:
     @property
     def output_names(self) -> list[str]:
         """Names of the named quantities of the dataset."""
-        return [item.name for item in self.model.system.outputs]
+        return list(self.model.system.output_columns)
 
     @property
     def accounts(self) -> tuple[str, ...]:
@@ -367,7 +367,7 @@ class EmbeddedScene:
         """
         count, random = len(self.states), np.random.default_rng(0)
         samples = 2 * count + SPARE_SAMPLES
-        scales = np.array([state.finest or state.scale for state in self.model.system.states])[self.evaluation.free]
+        scales = np.array([state.size for state in self.model.system.states])[self.evaluation.free]
         about = x[:count] + NEARBY * random.random((samples, count)) * np.maximum(np.abs(x[:count]), scales)
         following = min((b for b in self.breakpoints if b > t), default=np.inf)
         times = t + random.random(samples) * min(following - t, 1.0)

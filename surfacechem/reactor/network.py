@@ -177,7 +177,7 @@ class ReactorNet(cantera.ReactorNet):
 
         if np.any(room(now, np.asarray(self.get_state())) < 0):  # an event has passed the limit
             return now
-        step = last_step(self, now, end, np.ones(len(limits)))
+        step = last_step(self, now, end)
         guards = Guards.of([Guard.stop()] * int(limited.sum()), room)
         guards.start(room(now, step.y(now)))
         return first_crossing(step, guards, np.ones(int(limited.sum()), dtype=bool), 0.0)[0]

@@ -132,7 +132,7 @@ class StepWatcher:
         now = float(self.net.time)
         self.started, self.event = True, None
         self.known = max([now, *(item.asked for item in self.interfaces)])
-        self._step = step = last_step(self.net, now, self.known, np.ones(self.net.n_vars))
+        self._step = step = last_step(self.net, now, self.known)
         for item, before in zip(self.interfaces, self._before, strict=True):
             if not len(before):
                 continue

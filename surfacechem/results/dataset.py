@@ -66,7 +66,7 @@ def changes_of(attributes: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
 
 def quantities(system: System) -> dict[str, Quantity]:
     """Return the states, except those inside bodies, and the named quantities, by name."""
-    states = {state.name: state.quantity for state in system.states if state.name not in system.interior}
+    states = {name: state.quantity for name, state in system.own_states.items()}
     return states | {item.name: item.quantity for item in system.outputs}
 
 
@@ -77,7 +77,7 @@ def quantity_columns(
     name and size; in a sweep a quantity is NaN at times that a run did not reach.
     """
     system = runs[0].model.system
-    kept = [j for j, state in enumerate(system.states) if state.name not in system.interior]
+    kept = [system.state_columns[name] for name in system.own_states]
     found = quantities(system)
     values: Iterable[Array] = (*runs[0].result.outputs[:, kept].T, *runs[0].outputs.T)
     if axes:  # one table for all runs; a column is a view of it

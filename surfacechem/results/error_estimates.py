@@ -427,7 +427,7 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
 def states(trajectory: Trajectory) -> dict[str, Array]:
     """Return the states at the output times, by name; those inside a body as one profile."""
     system, outputs = trajectory.model.system, trajectory.result.outputs
-    found = {name: outputs[:, j] for name, j in system.state_columns.items() if name not in system.interior}
+    found = {name: outputs[:, system.state_columns[name]] for name in system.own_states}
     return found | {profile.name: profile_values(trajectory, profile) for profile in system.profiles}
 
 

@@ -101,12 +101,11 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
         column("event_entropy", "J/(m^2 K)", "entropy produced", attrgetter("entropy")),
         column("event_verdict", "1", verdict, attrgetter("verdict"), ""),
     ]
-    for k, state in enumerate(system.states):
-        if state.name not in system.interior:
-            q = state.quantity
-            for side in ("before", "after"):
-                text, read = f"{q.long_name} {side}", lambda event, side=side, k=k: float(getattr(event, side)[k])
-                columns.append(column(f"{q.name}_{side}", q.unit, text, read))
+    for name, state in system.own_states.items():
+        q, k = state.quantity, system.state_columns[name]
+        for side in ("before", "after"):
+            text, read = f"{q.long_name} {side}", lambda event, side=side, k=k: float(getattr(event, side)[k])
+            columns.append(column(f"{q.name}_{side}", q.unit, text, read))
     return columns
 
 

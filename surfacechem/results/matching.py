@@ -209,7 +209,7 @@ def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
     """Return exact values under the names of the scene; variables that it does not have are left out."""
     system = run.model.system
     known = system.state_columns | system.output_columns
-    temperatures = [state.name for state in system.states if state.is_temperature and state.name not in system.interior]
+    temperatures = [name for name, state in system.own_states.items() if state.is_temperature]
     rates = [own for own in known if own.startswith("R_")]
     # Variables with another name in exact solutions.
     others = {"T": temperatures, "R_c": rates, "sigma_chem": [f"sigma_{own[2:]}" for own in rates]}

@@ -18,13 +18,13 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.format.plans import Plan
 from surfacechem.model.system import System
-from surfacechem.quantities import VELOCITIES
 from surfacechem.results.audit import LAST_DIGITS, TOTALS, residuals, resolved
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import REACHES, STATUSES, Columns, Keep, crossed, reason_table, variable
 from surfacechem.solve import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
+from surfacechem.solve.jumps import velocity_scales
 from surfacechem.solve.lanes.lane_batch import solve_batch
 from surfacechem.solve.radau.solver import Room, consistent, put_rates, solve_arrays
 from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
@@ -147,10 +147,11 @@ class ArrayRuns:
         self.problem = replace(self._first_problem(changes), explicit=run.solver == EXPLICIT, implicit_lanes=stiff)
         system = model.system
         self.n = len(system.states)
-        paths = [parameter.path for parameter in system.parameters]
-        self.parameter_columns = {path: paths.index(path) for path in plan.paths if path in paths}
-        y = np.array([state.from_given(self.values) for state in system.states])
-        self.first_row = np.concatenate([[0.0], y, np.zeros(self.n), self.problem.parameters[0]])
+        columns = system.parameter_columns
+        self.parameter_columns = {path: columns[path] for path in plan.paths if path in columns}
+        self.first_row = np.concatenate(
+            [[0.0], system.initial_state(self.values), np.zeros(self.n), self.problem.parameters[0]]
+        )
         """Arguments of compiled functions at the start of a run of the case."""
         self.state_columns = [(j, state) for j, state in enumerate(system.states) if state.path in plan.paths]
         self.reasons = reason_table(system)
@@ -287,7 +288,7 @@ class ArrayRuns:
             return self.no_peaks, np.ones(count, dtype=bool)
         # The same magnitudes as at the start of a single run, where nothing has been evaluated before.
         first = len(model.margins)
-        scales = np.array([(s.finest or s.scale) * (s.name in VELOCITIES) for s in model.system.states])
+        scales = velocity_scales(model.system)
         y = rows[:, 1 : 1 + self.n]
         sizes = jumper.magnitudes(np.concatenate([rows, np.maximum(scales, np.abs(y))], axis=1))
         if not np.isfinite(sizes.sum()):
@@ -365,11 +366,8 @@ class ArrayRuns:
 
     def _values(self, rows: Array) -> Values:
         """Return states and named quantities at rows of arguments: the table of all, and its columns by name."""
-        system = self.model.system
         table = np.concatenate([rows[:, 1 : 1 + self.n], self.model.output_function(rows)], axis=1)
-        return table, dict(
-            zip((*(state.name for state in system.states), *system.output_columns), table.T, strict=True)
-        )
+        return table, dict(zip(self.model.system.variable_names, table.T, strict=True))
 
     def along(self, found: Ends, clear: Mask) -> Columns:
         """Return series, extremes and balances, from outputs and steps."""

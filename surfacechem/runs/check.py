@@ -70,7 +70,7 @@ def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
     n = len(system.states)
     algebraic = np.array([state.algebraic for state in system.states])
     parameters = [p.at(0.0) if p.load else values[p.path] for p in system.parameters]
-    y, ydot = np.array([state.from_given(values) for state in system.states]), np.zeros(n)
+    y, ydot = system.initial_state(values), np.zeros(n)
     for _ in range(50):
         inputs = np.concatenate([[0.0], y, ydot, parameters])
         K, M = model.program.derivatives(inputs)

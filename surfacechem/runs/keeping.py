@@ -95,8 +95,7 @@ def balances_of(run: Trajectory, balances: Audit) -> dict[str, Any]:
 
 def keep_of(section: KeepSection | None, system: System) -> Keep:
     """Return the selection of a section, by default all ends, extremes and events; InputError for an unknown name."""
-    states = [state.name for state in system.states if state.name not in system.interior]
-    known = {"quantities": [*quantities(system)], "events": event_names(system), "states": states}
+    known = {"quantities": [*quantities(system)], "events": event_names(system), "states": [*system.own_states]}
     if section is None:
         every = tuple(known["quantities"])
         return Keep(last=every, max=every, min=every, events=tuple(known["events"]))
@@ -178,12 +177,11 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
 def at_end(run: Trajectory) -> dict[str, float]:
     """Return states and named quantities at the end of a run by name, also where the end is no output."""
     result, model = run.result, run.model
-    names = [state.name for state in model.system.states] + [*model.system.output_columns]
     t, y, ydot = np.array([result.t]), result.y[None], result.ydot[None]
     rows = model.inputs(result, t, y, ydot)
     if result.status is Status.FINISHED:  # rates from the equations, as at outputs
         put_rates(model.program, rows)
-    return dict(zip(names, [*result.y, *model.named(rows)[0]], strict=True))
+    return dict(zip(model.system.variable_names, [*result.y, *model.named(rows)[0]], strict=True))
 
 
 def extremes(run: Trajectory) -> dict[str, dict[str, float]]:

@@ -17,7 +17,7 @@ import numpy as np
 import symengine
 from numpy.typing import ArrayLike, NDArray
 
-from surfacechem.compile.program import Function, compile_function, expanded, jacobian
+from surfacechem.compile.program import compile_function, expanded, jacobian
 from surfacechem.contracts.terms import Load
 from surfacechem.contracts.units import parse, quotient
 from surfacechem.documents import document
@@ -147,6 +147,8 @@ class Evaluator:
         self.rows = [*_rates(system, balances), *(item for item in system.outputs if item.name not in self.given)]
         self.rows += _capacities(system, scene, self.given)
         self.conditions = Conditions(system)
+        self._starts = mode_starts(system)
+        """Columns of the modes in which a run would start from a state, and the function for their values."""
         by = sorted({*self.unknown, *(item.column for item in self.given.values())})
         expressions = [*system.rows.values(), *balances.values(), *(row.expression for row in self.rows)]
         self.slopes = Slopes(system, expressions, by, self.conditions.margins)
@@ -216,8 +218,8 @@ class Evaluator:
         values = {**values_of(system), **changes}
         parameters = np.array([[values[parameter.path] for parameter in system.parameters]])
         start_registers(system, parameters, values)
-        states = [state.from_given(values) for state in system.states]
-        return np.array([0.0, *states, *np.zeros(len(states)), *parameters[0]])
+        states = system.initial_state(values)
+        return np.concatenate([[0.0], states, np.zeros_like(states), parameters[0]])
 
     def _sought(self, asked: Mapping[str, Argument]) -> list[int]:
         """Return the indices of balances to be solved: of unknowns that points neither give nor move with a gap."""
@@ -257,11 +259,6 @@ class Evaluator:
         """Gaps in equilibrium that are free at the start."""
         items, start = self.system.equilibria, Point.of(self.first, len(self.system.states))
         return [items[k] for k in Equilibria(self.system).free(start)] if items else []
-
-    @cached_property
-    def _starts(self) -> tuple[list[int], Function]:
-        """Columns of the modes in which a run would start from a state, and the function for their values."""
-        return mode_starts(self.system)
 
     def _solved(self, table: Array, rows: Sequence[int], unknown: Sequence[int]) -> tuple[Array, Array, Array]:
         """Solve the balances; return balances and rows at the points, their derivatives, and the margins."""
@@ -386,7 +383,7 @@ def _rates(system: System, balances: Collection[str]) -> Iterator[Named]:
     for state in system.states:
         if state.algebraic or state.name in balances:
             yield Named(state.quantity, state.symbol)
-        if not state.algebraic and state.name not in system.interior:
+        if not state.algebraic and state.name in system.own_states:
             text = f"rate of change of the {state.quantity.long_name}"
             yield Named(Quantity(f"d{state.name}_dt", quotient(state.quantity.unit, "s"), text), state.dot)
 

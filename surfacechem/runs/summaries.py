@@ -62,8 +62,7 @@ def duration(seconds: float) -> str:
 
 def states(system: System) -> str:
     """List the states by name; algebraic ones are marked."""
-    lone = [state for state in system.states if state.name not in system.interior]
-    names = [f"{state.name} (algebraic)" if state.algebraic else state.name for state in lone]
+    names = [f"{name} (algebraic)" if state.algebraic else name for name, state in system.own_states.items()]
     names += [f"{profile.name} ({len(profile.points) - 1} cells)" for profile in system.profiles]
     return ", ".join(names) or "nothing: everything is prescribed"
 
@@ -318,10 +317,9 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
     """Return rows of states with unit, kind, initial value and meaning; the states inside a body are one row."""
     starts = {state.name: state.initial for state in system.states}
     rows: list[tuple[str, ...]] = []
-    for s in system.states:
-        if s.name not in system.interior:
-            kind, start = ("algebraic", "guess") if s.algebraic else ("evolved", "from")
-            rows.append((s.name, f"[{s.quantity.unit}]", kind, f"{start} {s.initial:g}", s.quantity.long_name))
+    for s in system.own_states.values():
+        kind, start = ("algebraic", "guess") if s.algebraic else ("evolved", "from")
+        rows.append((s.name, f"[{s.quantity.unit}]", kind, f"{start} {s.initial:g}", s.quantity.long_name))
     for p in system.profiles:
         start = f"from {starts[p.states[0]]:g}" if p.states else ""
         rows.append((p.name, "[K]", "evolved", start, f"temperatures across {p.body}, in {len(p.points) - 1} cells"))

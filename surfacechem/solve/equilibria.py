@@ -121,11 +121,11 @@ class Equilibria:
         self.system = system
         self.states = [state.name for state in system.states]
         self.items = system.equilibria
-        paths = [parameter.path for parameter in system.parameters]
-        self.slip = paths.index(SLIP_PATH) if SLIP_PATH in paths and any(e.slip for e in self.items) else None
+        columns = system.parameter_columns
+        self.slip = columns.get(SLIP_PATH) if any(e.slip for e in self.items) else None
         """Column of the sliding mode among the parameters, if gaps in equilibrium stick or slide."""
-        sided = SIDE_PATH in paths and "g_n" in self.states
-        self._side = 1 + 2 * len(self.states) + paths.index(SIDE_PATH) if sided else None
+        sided = SIDE_PATH in columns and "g_n" in self.states
+        self._side = 1 + 2 * len(self.states) + columns[SIDE_PATH] if sided else None
         self.followers = [1 + self.states.index(name) for name in system.followers]
         """Columns among the inputs of the states that follow the normal gap where it jumps."""
 

@@ -96,7 +96,7 @@ class Jump:
 
 def velocity_scales(system: System) -> Array:
     """Return the scales of the velocities among the states, zero for the other states."""
-    return np.array([(state.finest or state.scale) * (state.name in VELOCITIES) for state in system.states])
+    return np.array([state.size * (state.name in VELOCITIES) for state in system.states])
 
 
 _ONE_THREAD = threading.RLock()

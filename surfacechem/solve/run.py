@@ -151,7 +151,7 @@ class Discontinuities(NamedTuple):
         if len(t):  # rates and algebraic variables are still those from before
             found = consistent(model.program, t, after[:, y], 0.0, after[:, 1 + 2 * n :])
             after[found.valid, y], after[found.valid, ydot] = found.y[found.valid], found.ydot[found.valid]
-        names = [*(state.name for state in model.system.states), *model.system.output_columns]
+        names = model.system.variable_names
         sides = [np.hstack((rows[:, y], model.named(rows.copy()))).T for rows in (before, after)]
         last = (np.diff(owner, append=-1) != 0) | (np.diff(t, append=np.inf) > 0)
         return cls(owner, t, dict(zip(names, sides[0], strict=True)), dict(zip(names, sides[1], strict=True)), last)
@@ -283,7 +283,7 @@ class Trajectory:
         """Return the largest change of each named quantity by ``changes`` of one state, shape (times, states)."""
         model, system, times = self.model, self.model.system, self.result.times
         # Of the states inside bodies only the first enters a flux; the others are not named.
-        own = [j for j, state in enumerate(system.states) if state.name not in system.interior]
+        own = [system.state_columns[name] for name in system.own_states]
         together = max(1, ROWS_AT_ONCE // max(len(times), 1))
         worst = np.zeros(self.outputs.shape[1])
         for chunk in (own[first : first + together] for first in range(0, len(own), together)):
@@ -303,9 +303,8 @@ class Trajectory:
     @cached_property
     def columns(self) -> dict[str, tuple[Array, ...]]:
         """States and named quantities, each at the output times and at every step."""
-        names = [*(state.name for state in self.model.system.states), *self.model.system.output_columns]
         tables = [(*self.result.outputs.T, *self.outputs.T), *([self._at_steps] if self._at_steps else [])]
-        return dict(zip(names, zip(*tables, strict=True), strict=True))
+        return dict(zip(self.model.system.variable_names, zip(*tables, strict=True), strict=True))
 
     @cached_property
     def _at_steps(self) -> tuple[Array, ...]:
@@ -413,9 +412,8 @@ def _external_inputs(system: System) -> ExternalInputs | None:
     outside = system.external_rates
     if outside is None:
         return None
-    paths = [parameter.path for parameter in system.parameters]
-    first = 1 + 2 * len(system.states)
-    positions = np.array([first + paths.index(path) for path in outside.engine.gives], dtype=np.int64)
+    first, columns = 1 + 2 * len(system.states), system.parameter_columns
+    positions = np.array([first + columns[path] for path in outside.engine.gives], dtype=np.int64)
     reads = compile_function(system.inputs, [system.expand(expression) for expression in outside.reads])
     return ExternalInputs(reads, positions, outside.engine)
 
@@ -428,7 +426,7 @@ class Model:
         system = system.with_dummy_state()
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
-        self.system = system
+        self.system, self._sizes = system, np.array([state.size for state in system.states])
         self.margins = system.event_margins
         """Margins that can close during the run; the others are checked at the start only."""
         names, formed = [item.symbol for item in system.named], [item.expression for item in system.named]
@@ -516,7 +514,7 @@ class Model:
             segments, parameters = self.passing.pieces(segments, parameters, fastest, run.max_steps)
         for _ in range(run.closer):
             segments, parameters = pieces.cut(segments, parameters)
-        y = np.array([state.from_given(values) for state in system.states])
+        y = system.initial_state(values)
         columns, begun = self.starts
         parameters[:, columns] = begun(np.concatenate([[0.0], y, np.zeros_like(y), parameters[0]]))
         pieces.start_registers(system, parameters, values)
@@ -535,7 +533,7 @@ class Model:
             segments=segments,
             parameters=parameters,
             rtol=run.rtol,
-            atol=self._scales * (run.atol if run.atol is not None else ATOL_OF_SCALE * run.rtol),
+            atol=self._sizes * (run.atol if run.atol is not None else ATOL_OF_SCALE * run.rtol),
             margins=self._guards,
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
@@ -555,10 +553,6 @@ class Model:
     @cached_property
     def _limits(self) -> StartLimits:
         return StartLimits(self.system)
-
-    @cached_property
-    def _scales(self) -> Array:
-        return np.array([state.finest or state.scale for state in self.system.states])
 
     @cached_property
     def _guards(self) -> tuple[Guard, ...]:

@@ -113,8 +113,7 @@ class Subject:
     @property
     def states(self) -> list[str]:
         """Names of the states."""
-        system = self.model.system
-        return [state.name for state in system.states if state.name not in system.interior]
+        return list(self.model.system.own_states)
 
     @property
     def names(self) -> list[str]:

@@ -177,7 +177,7 @@ def _numbers(system: System, symbols: Mapping[str, str], attributes: Mapping[str
     values = {path: f"{value:.6g}" for path, value in values_of(system, changes).items()}
     values |= dict.fromkeys(recorded_plan(attributes["sweep"]).paths if "sweep" in attributes else (), "swept")
     texts = {p.path: p.spec.text for p in system.parameters if p.path in units}
-    evolved = [state for state in system.states if not (state.algebraic or state.name in system.interior)]
+    evolved = [state for state in system.own_states.values() if not state.algebraic]
     texts |= {state.path: f"{state.at_start[0].long_name} at the start" for state in evolved}
     notes = {path: f"; {own[path]:.6g} in the case" for path, value in changes.items() if value != own[path]}
     rows = [

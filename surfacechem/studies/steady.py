@@ -130,12 +130,12 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
 
 def _wanted(system: System, of: Sequence[str]) -> dict[str, int]:
     """Return the indices of quantities among the outputs, by name; of all productions if none is named."""
-    names = [item.name for item in system.outputs]
+    names = system.output_columns
     refuse_unknown(of, names, "the case has no quantity '{}'")
     wanted = [*of] or [name for name in names if name.startswith("production_")]
     if not wanted:
         raise InputError("nothing is made in a neighbour: name the rates that matter, `--of R_R1` for instance.")
-    return {name: names.index(name) for name in wanted}
+    return {name: names[name] for name in wanted}
 
 
 def _conserved(interface: Interface) -> list[dict[str, float]]:
@@ -168,7 +168,6 @@ class _Rest:
         self, model: Model, run: Run, wanted: dict[str, int], conserved: Sequence[Mapping[str, float]]
     ) -> None:
         self.model, self.values, self.wanted = model, model.values(), wanted
-        self._place = {parameter.path: j for j, parameter in enumerate(model.system.parameters)}
         self.time = run.times[-1]
         for _ in range(MOST_ATTEMPTS):
             reached = model.solve(replace(run, times=(0.0, self.time), picture=None))
@@ -216,7 +215,7 @@ class _Rest:
 
     def response(self, paths: Sequence[str]) -> Array:
         """Return the change of the quantities, including that of the state, per relative change of these parameters."""
-        parameters, columns = self.evaluation.parameters, [self._place[path] for path in paths]
+        parameters, columns = self.evaluation.parameters, [self.model.system.parameter_columns[path] for path in paths]
         first = parameters[columns].copy()
         ends = []
         for sign in (1, -1):

@@ -231,14 +231,10 @@ class _SystemReactor(StateVectorReactor):
         np.divide(evaluation.rates() if self.counts else evaluation.slopes(), self.unit, out=np.asarray(rhs))
 
 
-def last_step(net: Any, start: float, end: float, unit: Array, columns: slice = slice(None)) -> DenseStep:
-    """Return the last step of a network, from the derivatives of its integrator's polynomial at the present time.
-
-    ``unit`` are the units in which the network has the variables.
-    """
+def last_step(net: Any, start: float, end: float) -> DenseStep:
+    """Return the last step of a network, from the derivatives of its integrator's polynomial at the present time."""
     now, orders = float(net.time), np.arange(int(net.solver_stats["last_order"]) + 1)
-    derivatives = np.array([net.get_derivative(k)[columns] for k in orders.tolist()])
-    rows = derivatives / FACTORIALS[: len(orders), None] * unit
+    rows = np.array([net.get_derivative(k) for k in orders.tolist()]) / FACTORIALS[: len(orders), None]
 
     def y(t: Any) -> Array:
         return np.asarray(np.power.outer(t - now, orders) @ rows)
