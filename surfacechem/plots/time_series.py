@@ -173,9 +173,7 @@ def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None, against:
     if not differing:
         raise InputError("a figure needs states that differ.", style.place_of(dataset))
     over = against or differing[0]
-    others = [name for name in differing if name != over]
-    usual = [name for name in others if unit(dataset[name]) in UNITS_AT_STATES] or others
-    names = variables or usual[:MOST_PANELS_AT_STATES]
+    names = variables or _usual_at_states(dataset, [name for name in differing if name != over])
     refused = dataset["admissible"].values == 0
     with style.panels(6.4, 0.7 + 1.9 * len(names), len(names), sharex=True) as (plot, grid):
         order = np.argsort(dataset[over].values, kind="stable")
@@ -187,6 +185,11 @@ def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None, against:
         style.label_variable(grid[-1, 0].xaxis, dataset[over])
         style.headings(plot, grid[0, 0], dataset, more=f"{refused.sum()} refused" if refused.any() else "")
     return plot
+
+
+def _usual_at_states(dataset: xarray.Dataset, names: Sequence[str]) -> Sequence[str]:
+    """Return the tractions and heat fluxes among the names; without any the first names."""
+    return ([name for name in names if unit(dataset[name]) in UNITS_AT_STATES] or names)[:MOST_PANELS_AT_STATES]
 
 
 def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | None:
