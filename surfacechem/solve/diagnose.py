@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from surfacechem.compile.program import Program
 from surfacechem.model.system import Margin, State, System, TimeScale
 from surfacechem.solve.contract import REASONS, Array, Points, Result, Status
+from surfacechem.solve.hybrid import rounding
+from surfacechem.solve.radau.roundoff import SINGULAR_NOISE
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.tolerances import ATOL_OF_SCALE, CLOSED_GUARD, IDLE, NEGLIGIBLE, NEWTON_EPS, RUN_EPS
 
@@ -73,7 +75,10 @@ def termination(
     algebraic = [state for state in system.states if state.algebraic]
     if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
         return "stopped", f"{_unbalanced(system, algebraic, inputs)} at {where}"
-    ends = filter(None, (runaway(system.states, result), beyond_numbers(system, result, inputs, named)))
+    ends = filter(
+        None,
+        (hidden(system.states, result), runaway(system.states, result), beyond_numbers(system, result, inputs, named)),
+    )
     if (end := next(ends, None)) is not None:
         return "stopped", f"{end} near {where}"
     cause = too_fast(system, result, values) or swiftest(system.states, result)
@@ -153,6 +158,20 @@ def _values(
     values = np.atleast_2d(program.margins(program.filled(np.concatenate(inputs, axis=1))))
     active = np.array([system.active_guards(row) for row in result.problem.parameters])[segment]
     return np.where(active, values, np.nan)
+
+
+def hidden(states: Sequence[State], result: Result) -> str | None:
+    """Describe the algebraic state that roundoff of its balance hides, if the step size underflowed there."""
+    if result.status is not Status.STEP_UNDERFLOW:
+        return None
+    noise, scales = rounding(result), np.array([state.scale for state in states])
+    uncertain = noise / (np.abs(result.y) + ATOL_OF_SCALE * scales) * [state.algebraic for state in states]
+    j = int(np.argmax(uncertain))
+    if not uncertain[j] > SINGULAR_NOISE:
+        return None
+    name, unit = states[j].name, states[j].quantity.unit
+    value, left = f"{result.y[j]:.3g} {unit}", f"{noise[j]:.2g} {unit}"
+    return f"roundoff hides {name} = {value}: terms that cancel in its balance are so large that they leave {left} open"
 
 
 def runaway(states: Sequence[State], result: Result) -> str | None:

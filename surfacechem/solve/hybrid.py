@@ -89,7 +89,8 @@ def without_stall(problem: Problem, velocities: NDArray[np.bool_]) -> Flow[Resul
 def rounding(result: Result) -> Array:
     """Return the uncertainty of each unknown at the end of a run from roundoff of its equation, shape (states,)."""
     problem, n = result.problem, len(result.y)
-    inputs = np.concatenate(([result.t], result.y, result.ydot, problem.parameters[-1]))
+    parameters = problem.parameters[np.searchsorted(problem.segments[1:-1], result.t, side="right")]
+    inputs = np.concatenate(([result.t], result.y, result.ydot, parameters))
     both = problem.program.derivatives(problem.program.filled(inputs))
     terms = np.abs(both[0] * result.y).sum(axis=1) + np.abs(both[1] * result.ydot).sum(axis=1)
     matrix = np.where(problem.program.algebraic_mask, both[0], both[1])

@@ -7,6 +7,7 @@ import pytest
 from scenes import SITES, bodies, path, perfect_contact, varying
 from solved import solve
 
+import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import AdhesionIntensity
 from surfacechem.laws.factors import Linear
@@ -96,3 +97,23 @@ def test_a_run_that_takes_too_many_steps_says_how_many_and_what_for():
     reason = solve(Scene(bodies(), friction, [], loading, None, 300.0, APART), 10.0, max_steps=1000).reason
     assert "`run.max-steps` is 1000, and " in reason
     assert " of them ended at events, or where loads turn" in reason
+
+
+def test_an_interface_whose_balance_is_roundoff_is_named():
+    """A damper is torn open within nanoseconds: its heat is 1e16 times what passes through the interface."""
+    found = surfacechem.run("""
+T_0: 300 K
+bodies:
+  lower: {temperature: T_1, C: 10 kJ/m^2/K}
+  upper: {temperature: T_2, C: 100 kJ/m^2/K}
+interface: {temperature: T_c, potential: [normal-stiffness: {E_n: 1e14 Pa/m}]}
+heat:
+  - conductance: {between: [lower, interface], h: 1 kW/m^2/K}
+  - conductance: {between: [interface, upper], h: 1 kW/m^2/K}
+mechanics: {normal: {k: 2e16 Pa/m, m: 3e15 kg/m^2, c_b: 4e18 Pa s/m, beta_1: 0}}
+loading: {w_n: {table: {times: [0 s, 1 s, 1.00000001 s], values: [0 nm, 0 nm, 100 nm]}}}
+initial: {T_1: 360 K, T_2: 300 K, g_n: 0 m}
+run: {until: 2 s}
+""")
+    assert found.status == "stopped"
+    assert found.reason.startswith("roundoff hides T_c = 329 K: ")
