@@ -489,6 +489,12 @@ class System:
         """Columns of the parameters, by path."""
         return {parameter.path: j for j, parameter in enumerate(self.parameters)}
 
+    @cached_property
+    def mode_columns(self) -> dict[str, int]:
+        """Columns of the modes among the parameters, by name."""
+        columns = {parameter.symbol: j for j, parameter in enumerate(self.parameters)}
+        return {mode.name: columns[mode.symbol] for mode in self.modes}
+
     def initial_state(self, values: Mapping[str, float]) -> Array:
         """Return the initial values of the states, from given values by path."""
         return np.array([state.from_given(values) for state in self.states])

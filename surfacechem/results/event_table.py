@@ -141,8 +141,7 @@ def _lasting(trajectory: Trajectory) -> list[EventRow]:
     """Return the events without those that others at the same time undo: modes and states are equal around them."""
     if not trajectory.jumps:
         return events_of(trajectory)
-    problem, symbols = trajectory.result.problem, {mode.symbol for mode in trajectory.model.system.modes}
-    modes = [j for j, parameter in enumerate(trajectory.model.system.parameters) if parameter.symbol in symbols]
+    problem, modes = trajectory.result.problem, [*trajectory.model.system.mode_columns.values()]
     moments: list[list[Jump]] = []
     for jump in trajectory.jumps:
         if not moments or jump.since > TIME_EPS * jump.t:
@@ -184,11 +183,9 @@ def event_findings(jumps: Sequence[Jump], unit: str = "J/(m^2 K)") -> list[str]:
 
 def event_waits(trajectory: Trajectory) -> list[str]:
     """Describe transitions for which a run that reached its end was still waiting, except those that end with it."""
-    parameters, last = trajectory.model.system.parameters, trajectory.jumps[-1:]
-    findings = []
-    for mode in trajectory.model.system.modes:
-        j = next(j for j, parameter in enumerate(parameters) if parameter.symbol == mode.symbol)
-        value = float(last[0].after.parameters[j]) if last else mode.initial
+    system, last, findings = trajectory.model.system, trajectory.jumps[-1:], []
+    for mode in system.modes:
+        value = float(last[0].after.parameters[system.mode_columns[mode.name]]) if last else mode.initial
         if trajectory.status == "finished" and value in mode.waits and not _ends(trajectory, mode.symbol, value):
             findings.append(f"the {mode.name} {mode.words[value]} did not end: it goes on until {mode.waits[value]}")
     return findings

@@ -85,7 +85,7 @@ def mode_starts(system: System) -> tuple[list[int], Function]:
     Columns are counted from the end of the arguments of compiled functions, which is that of the parameters.
     """
     started = [mode for mode in system.modes if mode.start is not None]
-    columns = [system.inputs.index(mode.symbol) - len(system.inputs) for mode in started]
+    columns = [system.mode_columns[mode.name] - len(system.parameters) for mode in started]
     return columns, compile_function(system.inputs, [system.expand(mode.start) for mode in started])
 
 
