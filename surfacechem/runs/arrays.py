@@ -125,8 +125,10 @@ def _starts_as_given(system: System, swept: set[str]) -> bool:
 
 
 def _takes_implicit_lanes(model: Model, run: Run, automatic: bool) -> bool:
-    """True if implicit steps were chosen because the runs are stiff; the other reasons for them ask for single runs."""
-    return automatic and run.solver == IMPLICIT and run.rtol > MIN_RTOL and not model.system.has_moving_gap
+    """True if only stiffness asks for implicit steps, of all runs or of those that turn stiff; the other reasons for
+    them ask for single runs.
+    """
+    return automatic and run.rtol > MIN_RTOL and not model.system.has_moving_gap
 
 
 class ArrayRuns:

@@ -87,7 +87,7 @@ class ChunkRuns:
     @cached_property
     def lanes(self) -> lane_batch.LaneMethod | None:
         """The method by which eight runs are stepped at once; None if no runs are."""
-        return next((lane_batch.method_of(solver.problem) for solver in self.solvers if not solver.jumps), None)
+        return next((next(lane_batch.methods_of(each.problem), None) for each in self.solvers if not each.jumps), None)
 
     @property
     def steps(self) -> str:

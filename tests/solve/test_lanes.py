@@ -228,6 +228,13 @@ def test_random_kinetics(rtol, n, left):
     assert found.counts[:, FIRST_COUNTER].sum() <= 1.2 * single.counts[:, FIRST_COUNTER].sum()
 
 
+def test_runs_that_turn_stiff_take_implicit_steps_in_lanes(left):
+    problem, columns = arrays_of(case_runs.load("three-temperatures"))
+    found = lane_batch.solve_batch(replace(problem, implicit_lanes=True), *columns)
+    assert left[0] == 0
+    assert_alike(found, solve_arrays(problem, *columns), problem.program.n, 3e-7)
+
+
 def test_threads_change_nothing():
     problem, (y0, table, *others) = arrays_of(case_runs.load("dna-adhesive"), 24, implicit=True)
     whole = lane_batch.solve_batch(problem, y0, table, *others).ends

@@ -1,6 +1,6 @@
 """Batches of runs of one model: eight at once in lanes, and one at a time where lanes do not apply."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -17,8 +17,23 @@ from surfacechem.solve.radau.stepper import END
 
 
 def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> Any:
-    """Solve a batch as :func:`solve_arrays` does, in lanes where the problem may be solved so and has vector code."""
-    method = method_of(problem)
+    """Solve a batch as :func:`solve_arrays` does, in lanes where the problem may be solved so and has vector code.
+
+    What explicit steps leave is tried by implicit ones, if the problem allows them; what these leave is solved alone.
+    """
+    methods = methods_of(problem)
+    batch = _solved(problem, next(methods, None), columns, room)
+    # A method is compiled when runs are left to it.
+    while len(left := np.flatnonzero(batch.counts[:, END] == Status.LEFT)):
+        own = [rows[left] if len(rows) == len(columns[0]) else rows for rows in columns]
+        repeated = _solved(problem, next(methods, None), own, room)
+        for name in ("ends", "counts", "outputs", "records", "events"):
+            getattr(batch, name)[left] = getattr(repeated, name)
+    return batch
+
+
+def _solved(problem: Problem, method: "LaneMethod | None", columns: Sequence[Array], room: Room | None) -> Any:
+    """Solve a batch by one method, without one run by run."""
     if method is None:
         return solve_arrays(problem, *columns, room=room)
     lanes = problem.program.lanes if method is EXPLICIT else problem.program.implicit_lanes
@@ -27,12 +42,6 @@ def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> 
     runs = y0, parameters, spacing, np.array((problem.max_steps,)), *others
     batch = batch_of(problem, runs, room, problem.program.lane_tables(lanes))
     run(batch, method)
-    left = np.flatnonzero(batch.counts[:, END] == Status.LEFT)
-    if len(left):
-        own = (rows[left] if len(rows) == len(y0) else rows for rows in columns)
-        repeated = solve_arrays(problem, *own, room=room)
-        for name in ("ends", "counts", "outputs", "records", "events"):
-            getattr(batch, name)[left] = getattr(repeated, name)
     return batch
 
 
@@ -72,8 +81,11 @@ EXPLICIT = _method("by explicit steps of order 8", EXPLICIT_MEMORY, "explicit_la
 RADAU = _method("by Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "lane_linear")
 
 
-def method_of(problem: Problem) -> LaneMethod | None:
-    """Return the method of a batch in lanes; None if its runs are solved one at a time."""
+def methods_of(problem: Problem) -> Iterator[LaneMethod]:
+    """Yield the methods of a batch in lanes, each for what those before leave; none if its runs are solved alone."""
     if problem.explicit:
-        return EXPLICIT if problem.program.lanes else None
-    return RADAU if problem.implicit_lanes and problem.program.implicit_lanes else None
+        if not problem.program.lanes:
+            return
+        yield EXPLICIT
+    if problem.implicit_lanes and problem.program.implicit_lanes:
+        yield RADAU
