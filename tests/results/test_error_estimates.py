@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import mpmath
 import numpy as np
@@ -409,23 +410,25 @@ run: {until: %d s}
 """
 
 
+def height(at, t, g, v, by):
+    """Of a flight that begins at t from the gap g with the velocity v, in doubles by NumPy, in all digits by mpmath."""
+    w, lift, s = 2 * by.pi, 14 / (2 * by.pi), at - t
+    return g + (v + lift * by.cos(w * t)) * s - 5 * s**2 - lift / w * (by.sin(w * at) - by.sin(w * t))
+
+
 def shaken_plate(end):
     """Gap of the plate by flights in 40 digits, each to its impact."""
     with mpmath.workdps(40):
         w, lift = 2 * mpmath.pi, 14 / (2 * mpmath.pi)
         t, g, v, e = mpmath.mpf(0), mpmath.mpf(0.3), mpmath.mpf(0), mpmath.mpf(0.95)
-
-        def flown(at):
-            s = at - t
-            height = g + (v + lift * mpmath.cos(w * t)) * s - 5 * s**2
-            return height - lift / w * (mpmath.sin(w * at) - mpmath.sin(w * t))
-
         while True:
             times = np.linspace(float(t), end, int(1000 * (end - float(t))) + 2)[1:]
-            below = next((k for k, at in enumerate(times) if k and flown(mpmath.mpf(at)) <= 0), None)
-            if below is None:
-                return float(flown(mpmath.mpf(end)))
-            hit = mpmath.findroot(flown, (times[below - 1], times[below]), solver="anderson")
+            below = np.flatnonzero(height(times, float(t), float(g), float(v), np)[1:] <= 0)
+            if not len(below):
+                return float(height(mpmath.mpf(end), t, g, v, mpmath))
+            bracket = times[below[0]], times[below[0] + 1]
+            flight = partial(height, t=t, g=g, v=v, by=mpmath)
+            hit = mpmath.findroot(flight, bracket, solver="anderson")
             fallen = v - 10 * (hit - t) - lift * (mpmath.cos(w * hit) - mpmath.cos(w * t))
             t, g, v = hit, mpmath.mpf(0), -e * fallen
 

@@ -472,10 +472,11 @@ def test_commands_write_a_store_and_go_on_with_it(tmp_path):
 
 
 def test_what_is_kept_goes_into_one_file_as_into_a_store(tmp_path):
+    few = [part.replace("points: 60", "points: 8") for part in GIVEN]
     for suffix in ("zarr", "nc", "csv"):
-        result = CliRunner().invoke(app, [*GIVEN, str(tmp_path / f"o.{suffix}")])
+        result = CliRunner().invoke(app, [*few, str(tmp_path / f"o.{suffix}")])
         assert result.exception is None, result.exception
-        assert (result.exit_code, "error      1.1e-11 of 60 runs" in result.output) == (0, True), result.output
+        assert (result.exit_code, "e-11 of 8 runs" in result.output) == (0, True), result.output
     assert {path.name for path in tmp_path.iterdir()} == {"o.zarr", "o.nc", "o.csv"}
     with opened(tmp_path / "o.zarr") as stored, xarray.open_dataset(tmp_path / "o.nc") as file:
         xarray.testing.assert_equal(stored.load(), file.load())
