@@ -249,15 +249,15 @@ def test_what_a_script_changes_around_a_gas_takes_effect_at_once(change):
         ct.PressureController(gas, outside, primary=feed, K=1e-7)
         wall = ct.Wall(gas, oven, A=1e-4, U=1.0)
         net = ReactorNet([gas, InterfaceReactor("exothermic")])
-        net.advance(200.0)
+        net.advance(30.0)
         steps = net.solver_stats["steps"]
-        net.advance(200.1)
+        net.advance(30.1)
         assert net.solver_stats["steps"] >= steps
         before = gas.phase.T, *gas.phase["N2", "O2"].X
         change({"gas": gas, "source": source, "oven": oven, "feed": feed, "wall": wall})
         if anew:
             net.reinitialize()
-        net.advance(201.0)
+        net.advance(31.0)
         found.append((gas.phase.T, *gas.phase["N2", "O2"].X))
     assert found[0] == pytest.approx(found[1], rel=1e-8)
     assert found[0] != pytest.approx(before, rel=1e-5) or not gas.energy_enabled
@@ -489,7 +489,7 @@ def test_a_time_that_is_no_finite_number_is_refused(t):
 
 @pytest.mark.parametrize("t", [np.float32(1.5), np.array(1.5), 1.5])
 def test_a_time_of_any_kind_of_number(t):
-    net = ReactorNet([InterfaceReactor("stick-slip")])
+    net = ReactorNet([InterfaceReactor("debonding")])
     net.advance(1.0)
     assert net.advance(t) == 1.5
 
