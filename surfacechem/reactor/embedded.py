@@ -167,6 +167,24 @@ def _refuse_folds(system: System) -> None:
         )
 
 
+def _combination(states: Array, accounts: Array) -> Array:
+    """Return the fixed combinations of the rates of states that give those of accounts: [state, account], or zero.
+
+    Rates are given at several samples, a row each, with largest values of one.
+    """
+    # The rate of one state alone is found exactly, though reactions that are fast both ways dominate at random states.
+    largest = np.abs(states).argmax(axis=0)
+    alone = accounts[largest] * np.sign(np.diag(states[largest]))[:, None]
+    rest = np.array([np.abs(accounts - np.outer(*pair)).max(axis=0) for pair in zip(states.T, alone, strict=True)])
+    alone = np.where((np.arange(len(rest))[:, None] == rest.argmin(axis=0)) & (rest < ROUNDED_COMBINATION), alone, 0.0)
+    # States that follow from others, such as the last coverage, would share their part, with their roundoff.
+    states = np.where(np.abs(np.diag(np.linalg.qr(states).R)) < ROUNDED_COMBINATION, 0.0, states)
+    found = np.linalg.lstsq(states, accounts)[0]
+    fits = np.abs(states @ found - accounts).max(axis=0) < ROUNDED_COMBINATION
+    found[np.abs(found) < ROUNDED_COMBINATION] = 0.0
+    return np.where(alone.any(axis=0), alone, np.where(fits, found, 0.0))
+
+
 class EmbeddedScene:
     """The scene of a case with values from the network: temperatures of reactors, heat, factors on its rates.
 
@@ -358,6 +376,17 @@ class EmbeddedScene:
     def _evaluations(self) -> Evaluations:
         return Evaluations(self.problem.program, self.evaluation.parameters)
 
+    def _sizes(self, x: Array) -> Array:
+        """Return magnitudes of the states, or their scales if these are larger."""
+        scales = np.array([state.size for state in self.model.system.states])
+        return np.asarray(np.maximum(np.abs(x[: len(self.states)]), scales[self.evaluation.free]))
+
+    def soonest_change(self, t: float, x: Array, rtol: float) -> float:
+        """Return the time [s] in which a state changes by a relative tolerance, at the present rates."""
+        rates = self.many_rates(np.array([t]), x[None], self.evaluation.parameters)[0, : len(self.states)]
+        with np.errstate(divide="ignore"):
+            return float(np.nanmin(rtol * self._sizes(x) / np.abs(rates), initial=np.inf))
+
     def combined(self, t: float, x: Array, given: Sequence[int]) -> Array:
         """Return how the accounts follow from the states: [state, account], zero for those that do not.
 
@@ -367,8 +396,7 @@ class EmbeddedScene:
         """
         count, random = len(self.states), np.random.default_rng(0)
         samples = 2 * count + SPARE_SAMPLES
-        scales = np.array([state.size for state in self.model.system.states])[self.evaluation.free]
-        about = x[:count] + NEARBY * random.random((samples, count)) * np.maximum(np.abs(x[:count]), scales)
+        about = x[:count] + NEARBY * random.random((samples, count)) * self._sizes(x)
         following = min((b for b in self.breakpoints if b > t), default=np.inf)
         times = t + random.random(samples) * min(following - t, 1.0)
         parameters = np.repeat(self.evaluation.parameters[None], samples, axis=0)
@@ -380,13 +408,8 @@ class EmbeddedScene:
             return np.zeros((count, rates.shape[1] - count))
         largest = np.abs(rates).max(axis=0)
         sizes = np.where(largest > TINY, largest, 1.0)
-        states, accounts = np.split(rates / sizes, [count], axis=1)
-        # States that follow from others, such as the last coverage, would share their part, with their roundoff.
-        states[:, np.abs(np.diag(np.linalg.qr(states).R)) < ROUNDED_COMBINATION] = 0.0
-        found = np.linalg.lstsq(states, accounts)[0]
-        rest = np.abs(states @ found - accounts).max(axis=0)
-        found[np.abs(found) < ROUNDED_COMBINATION] = 0.0
-        return np.where(rest < ROUNDED_COMBINATION, found * sizes[count:] / sizes[:count, None], 0.0)
+        found = _combination(*np.split(rates / sizes, [count], axis=1))
+        return np.asarray(found * sizes[count:] / sizes[:count, None])
 
     def moved(self, t: float, x: Array, index: int | None) -> tuple[Array, Array]:
         """Return the variables after a transition, or after the due ones if None, and the additions to the ledger.
@@ -441,6 +464,7 @@ class History:
             source=case.source,
             case=case.text if alone else "",
             mechanism=case.mechanism_text or "",
+            surface=case.scene.surface,
         )
 
     def _result(self, status: Status) -> Result:

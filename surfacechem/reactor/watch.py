@@ -23,7 +23,7 @@ from surfacechem.solve.contract import Array, Guard
 from surfacechem.tolerances import NEGLIGIBLE
 
 FIRST_AHEAD = NEGLIGIBLE**3
-"""Time of the first request after a start, as a fraction of the integration; first steps are shorter."""
+"""Longest time of the first request after a start, as a fraction of the integration."""
 
 MIN_AHEAD, LATER_AHEAD = 1e4, 4.0
 """The shortest first request and all later ones, in roundings of the time."""
@@ -122,10 +122,10 @@ class StepWatcher:
         self._before = [item.scene.transitions(now, item.x) for item in self.interfaces]
         if self.started:
             return min(goal, now + LATER_AHEAD * float(np.spacing(abs(now))))
-        soonest = min((item.scene.events.soonest() for item in self.interfaces if item.scene.events), default=np.inf)
-        return min(
-            goal, now + max(min(FIRST_AHEAD * (goal - now), soonest / 2), MIN_AHEAD * float(np.spacing(abs(now))))
-        )
+        soon = [FIRST_AHEAD * (goal - now)]
+        soon += [item.scene.events.soonest() / 2 for item in self.interfaces if item.scene.events]
+        soon += [item.scene.soonest_change(now, item.x, self.net.rtol) for item in self.interfaces]
+        return min(goal, now + max(min(soon), MIN_AHEAD * float(np.spacing(abs(now)))))
 
     def locate_event(self) -> None:
         """Locate the first event in the step that the integrator has just taken."""

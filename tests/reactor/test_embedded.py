@@ -8,7 +8,7 @@ from surfacechem.reactor import InterfaceReactor
 COMBINED = {
     "dna-adhesive": {
         ("theta_free_s", "formed_theta_free_s"): 1.0,
-        ("theta_free_s", "formed_theta_bond_s"): -1.0,  # the other coverage follows from this one
+        ("theta_free_s", "formed_theta_bond_s"): -1.0,  # as exact as by the other coverage
         ("T_1", "heat_into_1"): 2000.0,
         ("T_2", "heat_into_2"): 1000.0,
     },

@@ -52,6 +52,13 @@ def test_same_trajectory_as_a_run(name):
     assert interface.seconds_per_rate > 0
 
 
+def test_the_dataset_of_curved_surfaces():
+    interface, net = network("ball-in-a-socket")
+    net.advance(1e-7)
+    run = surfacechem.load("ball-in-a-socket", ["run.until=1e-7 s"]).run(error="balances")
+    assert set(run.dataset.variables) == set(interface.dataset.variables)
+
+
 PULSE = """
 bodies:
   lower: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
