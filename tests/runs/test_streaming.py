@@ -22,7 +22,7 @@ from surfacechem.cli.main import app
 from surfacechem.errors import InputError, OutputError
 from surfacechem.results import store
 from surfacechem.results.store import Layout, StoredArray, opened
-from surfacechem.runs import checking, keeping, streaming
+from surfacechem.runs import checking, streaming
 from surfacechem.runs.checking import check
 from surfacechem.runs.keeping import STATUSES, Keep, extremes
 from surfacechem.runs.summaries import store_summary
@@ -421,17 +421,6 @@ def test_the_steps_of_runs_follow_from_stiffness(name, solver, told):
     section = {"over": {path: [300.0]}, "keep": {"last": "all"}}
     simulation = surfacechem.load(name, {"sweep": section, **({"run.solver": solver} if solver else {})})
     assert streaming.steps_of(simulation) == told
-
-
-def test_stiff_runs_at_once_are_those_of_one_at_a_time():
-    path, found = "heat.conductance.h", []
-    section = {"over": {path: {"from": 1900.0, "to": 2300.0, "points": 20}}, "keep": {"last": ["T_1", "theta_bond_s"]}}
-    for solver in ({}, {"run.solver": "radau"}):
-        simulation = surfacechem.load("dna-adhesive", {"sweep": section, **solver})
-        keep = keeping.keep_of(simulation.case.sweep.keep, simulation.system)
-        found.append(streaming.ChunkRuns(simulation, simulation.plan(), keep, {}).columns(np.arange(20)))
-    for name in ("T_1_last", "theta_bond_s_last", "energy_error"):
-        assert found[0][name] == pytest.approx(found[1][name], rel=1e-10, abs=1e-10)
 
 
 def test_fluxes_that_vanish_at_rest_are_known_relative_to_their_largest_values(tmp_path):

@@ -67,13 +67,6 @@ def test_a_pressure_that_touches_nothing_goes_on(solved, size, phase):
     assert float(data.dataset["T"][-1]) == pytest.approx(np.sqrt(300.0**2 + heat * 600.0 / 2000.0), rel=1e-12)
 
 
-def test_a_pressure_that_passes_nothing_ends_the_run(solved):
-    wave = "{mean: 1e6, amplitude: 1.0001e6, frequency: 1 Hz}"
-    solution = solved(COULOMB + f"loading: {{v: 1 mm/s, p: {{harmonic: {wave}}}}}\n" + END)
-    assert solution.status == "stopped"
-    assert solution.trajectory.result.t == pytest.approx(0.75 - np.arccos(1 / 1.0001) / (2 * np.pi), abs=1e-7)
-
-
 def test_a_balance_in_which_nothing_is_exchanged_is_closed(solved):
     mount = "mechanics: {normal: {k: 1e12}}\nloading: {w_n: 0, F_n: -5 MPa}\n"
     solution = solved(CASE + "  potential: [normal-stiffness: {E_n: 3e12}]\n" + mount + END)
