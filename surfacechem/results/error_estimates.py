@@ -34,7 +34,7 @@ from surfacechem.results.dataset import profile_values
 from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.scene import Scene
 from surfacechem.solve import AUTO, method
-from surfacechem.solve.contract import Array, Mask, Problem, States, Status
+from surfacechem.solve.contract import Array, Mask, Problem, States, Status, among
 from surfacechem.solve.run import Run, Trajectory
 from surfacechem.tolerances import (
     ATOL_OF_SCALE,
@@ -59,7 +59,8 @@ ERROR_SOURCES = ("auto", "estimate", "balances")
 """
 
 MOST_TIMES = 400
-"""Largest number of times at which an exact solution is evaluated."""
+"""Largest number of times at which an exact solution is evaluated, and of those inside steps at which a second run is.
+"""
 
 DRIVING_TIMES = 10.0 ** np.arange(-15, 1)
 """Time steps, relative to a run, over which one state may drive another."""
@@ -220,24 +221,28 @@ def fewer(trajectory: Trajectory, late: float = 0.0) -> Trajectory:
 
 def second_settings(trajectory: Trajectory, known: bool = False) -> Run:
     """Return the settings of the second run: another tolerance, more and other checks against the equations, and
-    outputs also at the times of comparison. With ``known`` it records states inside its steps, too, as it may become
-    the result.
+    outputs at the times of comparison. With ``known`` it has those of the first, too, and records states inside its
+    steps, as it may become the result.
     """
-    run, seen = trajectory.run, trajectory.stored.result.times
-    times = tuple(np.union1d(run.times, seen).tolist())
+    run, seen, steps = trajectory.run, trajectory.stored.result.times, trajectory.result.steps
+    compared = among(seen, np.empty(0) if steps is None else steps.t)
+    others = np.flatnonzero(~compared)
+    compared[others[:: len(others) // MOST_TIMES + 1]] = True
+    times = tuple(np.union1d(run.times if known else (0.0, run.times[-1]), seen[compared]).tolist())
     inside = {} if known else {"picture": None, "looks": 0.0}
     return run.second(second_tolerance(run.rtol), times=times, **inside)
 
 
 def _second(trajectory: Trajectory, known: bool = False) -> Trajectory:
-    """Make the second run."""
-    return trajectory.model.solve_values(second_settings(trajectory, known), trajectory.values)
+    """Make the second run, with accounts if these are compared, or if it may become the result."""
+    settings = replace(second_settings(trajectory, known), accounts=known or not states(trajectory))
+    return trajectory.model.solve_values(settings, trajectory.values)
 
 
 def _second_events(trajectory: Trajectory) -> Trajectory:
     """Make the second run for its events alone: no step depends on the outputs."""
     run, ends = trajectory.run, (0.0, trajectory.run.times[-1])
-    brief = run.second(second_tolerance(run.rtol), times=ends, picture=None, looks=0.0)
+    brief = run.second(second_tolerance(run.rtol), times=ends, picture=None, looks=0.0, accounts=False)
     return trajectory.model.solve_values(brief, trajectory.values)
 
 

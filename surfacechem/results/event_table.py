@@ -123,7 +123,7 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
     columns = trajectory.model.system.state_columns
     end, fastest, slow = trajectory.run.times[-1] * (1 - SIDE), 0.0, -np.inf
     times: dict[str, list[float]] = {}
-    for event in _lasting(trajectory):
+    for event in _lasting(trajectory) if trajectory.jumps else events_of(trajectory):
         if event.jump and event.jump.edge.is_impact:
             speed = abs(float(event.before[columns["v_n"]]))
             fastest = max(fastest, speed)
@@ -139,8 +139,6 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
 
 def _lasting(trajectory: Trajectory) -> list[EventRow]:
     """Return the events without those that others at the same time undo: modes and states are equal around them."""
-    if not trajectory.jumps:
-        return events_of(trajectory)
     problem, modes = trajectory.result.problem, [*trajectory.model.system.mode_columns.values()]
     moments: list[list[Jump]] = []
     for jump in trajectory.jumps:

@@ -87,6 +87,8 @@ class Run:
     """True if it ends where nothing changes any more; the times are then those of a run of any length."""
     rest: float | None = None
     """Time at which it comes to rest [s], if that was found before."""
+    accounts: bool = True
+    """False if nobody asks for the accounts of the ledger; they are left out unless jumps book on them."""
     closer: int = 0
     """Number of looser runs before it in a chain of error estimates: 0 for a run, 1 for its second run."""
 
@@ -527,7 +529,7 @@ class Model:
         if system.equilibria:  # given gaps are first guesses only; those found must be admissible too
             self._limits.check(start, parameters[0])
         return Problem(
-            program=self.program,
+            program=self.program if run.accounts or self.jumper else self._without_accounts,
             y0=start,
             times=np.asarray(run.times, dtype=float),
             segments=segments,
@@ -553,6 +555,10 @@ class Model:
     @cached_property
     def _limits(self) -> StartLimits:
         return StartLimits(self.system)
+
+    @cached_property
+    def _without_accounts(self) -> Program:
+        return replace(self.program, ledger=None, n_ledger=0, groups=())
 
     @cached_property
     def _guards(self) -> tuple[Guard, ...]:

@@ -68,6 +68,23 @@ def test_an_end_that_the_exact_solution_has_is_compared_with_it(monkeypatch):
     assert len(runs) == 1
 
 
+def test_a_second_run_has_no_accounts_and_no_more_outputs_than_are_compared():
+    """Its error is that of one with all accounts and outputs; the accounts alone would ask for shorter steps."""
+    found = surfacechem.load("dna-adhesive").run().trajectory
+    settings = second_settings(found)
+    brief, whole = (
+        found.model.solve_values(replace(settings, **others), found.values)
+        for others in ({"accounts": False}, {"times": tuple(found.stored.result.times.tolist())})
+    )
+    ours, theirs = (estimated(found, second) for second in (brief, whole))
+    assert against_tighter(found).variables == ours.variables
+    assert ours.error == pytest.approx(theirs.error, rel=0.01)
+    assert ours.everywhere.keys() == theirs.everywhere.keys()
+    assert brief.result.counters.steps < whole.result.counters.steps
+    assert len(brief.result.times) < 0.5 * len(whole.result.times)
+    assert set(brief.result.times) >= set(found.result.steps.t)
+
+
 def test_where_nothing_evolves_the_error_is_that_of_the_laws():
     laws = CellErrors({"t_n": 1e-9}, source="and one with forces of the surfaces wrong by their error, 1.0e-09")
     found = with_cells(unknown(NOTHING_EVOLVES), laws)
