@@ -221,22 +221,21 @@ def fewer(trajectory: Trajectory, late: float = 0.0) -> Trajectory:
 
 def second_settings(trajectory: Trajectory, known: bool = False) -> Run:
     """Return the settings of the second run: another tolerance, more and other checks against the equations, and
-    outputs at the times of comparison. With ``known`` it has those of the first, too, and records states inside its
-    steps, as it may become the result.
+    outputs at the times of comparison, without accounts unless these are compared. With ``known`` it has all that the
+    first has, as it may become the result.
     """
     run, seen, steps = trajectory.run, trajectory.stored.result.times, trajectory.result.steps
     compared = among(seen, np.empty(0) if steps is None else steps.t)
     others = np.flatnonzero(~compared)
     compared[others[:: len(others) // MOST_TIMES + 1]] = True
     times = tuple(np.union1d(run.times if known else (0.0, run.times[-1]), seen[compared]).tolist())
-    inside = {} if known else {"picture": None, "looks": 0.0}
-    return run.second(second_tolerance(run.rtol), times=times, **inside)
+    brief = {} if known else {"picture": None, "looks": 0.0, "accounts": not states(trajectory)}
+    return run.second(second_tolerance(run.rtol), times=times, **brief)
 
 
 def _second(trajectory: Trajectory, known: bool = False) -> Trajectory:
-    """Make the second run, with accounts if these are compared, or if it may become the result."""
-    settings = replace(second_settings(trajectory, known), accounts=known or not states(trajectory))
-    return trajectory.model.solve_values(settings, trajectory.values)
+    """Make the second run."""
+    return trajectory.model.solve_values(second_settings(trajectory, known), trajectory.values)
 
 
 def _second_events(trajectory: Trajectory) -> Trajectory:

@@ -268,7 +268,11 @@ def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellE
 
 def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
     """Solve the runs at the second tolerance, as for a single run."""
-    pairs = [(second_settings(run), run.values) for run in done.runs]
+    settings, integrals = [second_settings(run) for run in done.runs], bool(done.statistics)
+    pairs = [
+        (replace(own, accounts=own.accounts or integrals), run.values)
+        for own, run in zip(settings, done.runs, strict=True)
+    ]
     runs = done.model.solve_all(pairs, threads or os.cpu_count() or 1)
     return replace(done, run=done.run.second(second_tolerance(done.run.rtol)), runs=runs)
 
