@@ -410,6 +410,26 @@ def test_a_contact_closes_on_a_drive_that_has_reversed_in_the_air(by, stiffness,
     np.testing.assert_allclose(found["t_t"][late], -side * pull * (found.dataset.time[late] - 4.0), rtol=1e-8)
 
 
+@pytest.mark.parametrize("rtol", [1e-11, 1e-12, 1e-13])
+@pytest.mark.parametrize("depth", ["2 um", "3 um"])
+def test_a_contact_that_closes_at_rest_sticks_whatever_roundoff_says(depth, rtol):
+    """Adhesion beside friction is stiffest at touch, so that the interface rests there for a moment."""
+    found = surfacechem.run(f"""
+bodies: {{a: {{temperature: 300 K}}, b: {{temperature: 300 K}}}}
+interface:
+  temperature: 300 K
+  potential: [exponential-cohesive-zone: {{t_max: 1.6 MPa, g_0: 1 um, E_n: 5 MPa/um}}]
+  friction: [coulomb: {{mu: 0.4, mu_s: 0.6}}]
+mechanics: {{normal: {{k: 7 MPa/um, m: 3.6e10 kg/m^2, c_g: 3e11 Pa s/m}}, tangential: {{k: 0.5 MPa/um}}}}
+loading:
+  w_n: {{table: {{times: [0 s, 1 s, 4 s], values: [2 um, 2 um, -{depth}]}}}}
+  w_t: {{table: {{times: [0 s, 1 s], values: [0 um, 3 um]}}}}
+initial: {{g_n: 1.8 um}}
+run: {{until: 4 s, rtol: {rtol}}}
+""")
+    assert sorted(jump.edge.name for jump in found.trajectory.jumps) == ["slip forward", "stop", "touch"]
+
+
 def test_an_elastic_slip_is_at_rest_where_the_bodies_have_come_apart():
     """The bond pulls harder as the gap opens, and no pressure falls with it."""
     found = surfacechem.run("""

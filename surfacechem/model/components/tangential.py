@@ -215,9 +215,9 @@ def _friction(
         grows = build.total_derivative(limit)
         back = {s: where(limit > 0, at, where(grows > 0, at, absolute(at) + PICOMETRE)) for s, at in back.items()}
         # As a limit of zero begins to grow, slip goes on in the direction of the drive. With the growth of friction it
-        # would be as much faster than free slip in one direction as it is slower in the other.
+        # would be as much faster than free slip in one direction as it is slower in the other. At rest it stops.
         other = 2 * free_velocity(build, kind) - v
-        onward = where(limit > TIME_EPS * build.t * grows, 0, where(SLIP * other < 0, -SLIP, 0))
+        onward = where(limit > TIME_EPS * build.t * grows, 0, where(SLIP * other < -PICOMETRE, -SLIP, 0))
     # Beyond touch a contact law may go on to negative pressure; there slip needs a pull to begin.
     reserves = {s: where(limit > 0, limit, 0) - s * needed for s in (1, -1)}
     breaks, end = breaks_bonds(build), dict.fromkeys(stops, ZERO)
