@@ -205,6 +205,25 @@ class ArrayRuns:
         line = spectrum.history(system, self.plan.load)
         return compile_function(system.inputs, [line, derivative(line, system.t)])
 
+    @cached_property
+    def reads_rates(self) -> bool:
+        """True if what is kept or balanced depends on rates of the states."""
+        system = self.model.system
+        read = set().union(*(system.expand(system.find(name).expression).free_symbols for name in self.quantities[0]))
+        return any(state.dot in read for state in system.states)
+
+    @cached_property
+    def quantities(self) -> tuple[list[str], Function]:
+        """Names of the quantities that are kept or balanced beside the states, and the function for their values."""
+        system, keep = self.model.system, self.keep
+        wanted = {*keep.last, *keep.max, *keep.min, *keep.series}
+        if keep.balances:
+            wanted |= {name for total, parts in TOTALS for name in (total, *parts)}
+            wanted |= {system.ledger[j].law for j in system.account_columns.get("bonds", ())}
+        chosen = [item for item in system.outputs if item.name in wanted]
+        expressions = [system.expand(item.expression) for item in chosen]
+        return [item.name for item in chosen], compile_function(system.inputs, expressions, system.cell_symbols)
+
     # -- from values to arrays ----------------------------------------------------------------------------------------
 
     def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
@@ -367,9 +386,12 @@ class ArrayRuns:
                 clear[hit] &= ~led & (margin.below is None)
 
     def _values(self, rows: Array) -> Values:
-        """Return states and named quantities at rows of arguments: the table of all, and its columns by name."""
-        table = np.concatenate([rows[:, 1 : 1 + self.n], self.model.output_function(rows)], axis=1)
-        return table, dict(zip(self.model.system.variable_names, table.T, strict=True))
+        """Return states, and what is kept or balanced, at rows of arguments: the table, and its columns by name."""
+        states, (names, quantities) = self.model.system.states, self.quantities
+        # Column-major, since columns are what is used.
+        table = np.empty((self.n + len(names), len(rows))).T
+        table[:, : self.n], table[:, self.n :] = rows[:, 1 : 1 + self.n], quantities(rows)
+        return table, dict(zip((*(state.name for state in states), *names), table.T, strict=True))
 
     def along(self, found: Ends, clear: Mask) -> Columns:
         """Return series, extremes and balances, from outputs and steps."""
@@ -381,7 +403,8 @@ class ArrayRuns:
         owner, k = np.nonzero(reached)
         t, y = times[np.minimum(owner, len(times) - 1), k], batch.outputs[owner, k, :n]
         rows = found.inputs(owner, t, y, np.zeros_like(y))
-        put_rates(self.model.program, rows)
+        if self.reads_rates:
+            put_rates(self.model.program, rows)
         table, values = self._values(rows)
         columns: Columns = {}
         for name in keep.series:
