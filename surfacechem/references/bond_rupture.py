@@ -318,8 +318,11 @@ class RebindingCluster(Cluster):
         def distance(d: Array) -> tuple[Array, Array]:
             return expansion.rate(d, self.critical_state + d) - expansion.value, expansion.derivative(d)
 
-        top = np.array([1.0 - self.critical_state])
-        return float(increasing_root(distance, target, np.zeros(1), top)[0])
+        # Up to second order in the exponent, r grows by d^2 / (phi_* + d) times this.
+        growth = 0.5 * math.exp(-expansion.apart) * expansion.critical_exponent**2
+        half, top = 0.5 * target / growth, np.array([1.0 - self.critical_state])
+        start = half + np.sqrt(half**2 + 2 * half * self.critical_state)
+        return float(increasing_root(distance, target, np.zeros(1), top, start)[0])
 
     @cached_property
     def _path(self) -> AutonomousODE:
