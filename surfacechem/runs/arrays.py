@@ -105,7 +105,7 @@ def of_each(best: np.ufunc, owner: Index, table: Array, count: int) -> Array:
     return found
 
 
-def all_above(table: Array, least: float, columns: Sequence[int]) -> Mask:
+def all_above(table: Array, least: float, columns: Sequence[int] | Index) -> Mask:
     """Return the mask of rows whose entries in some columns are above a number.
 
     Column by column: NumPy takes several times as long to reduce rows of a few entries.
@@ -312,16 +312,14 @@ class ArrayRuns:
         scales = velocity_scales(model.system)
         y = rows[:, 1 : 1 + self.n]
         sizes = jumper.magnitudes(np.concatenate([rows, np.maximum(scales, np.abs(y))], axis=1))
-        if not np.isfinite(sizes.sum()):
-            sizes = np.nan_to_num(sizes)
+        sizes = sizes if np.isfinite(sizes.sum()) else np.nan_to_num(sizes)
         seen = rows
         if jumper.guards_read_rates:
             point = consistent(program, np.zeros(count), y, np.zeros_like(y), rows[:, 1 + 2 * self.n :])
             seen = np.concatenate([rows[:, :1], point.y, point.ydot, rows[:, 1 + 2 * self.n :]], axis=1)
         now = program.margins(seen)
-        none_due = np.ones(count, dtype=bool)
-        for j in first + np.flatnonzero(model.system.active_guards(self.problem.parameters[0])[first:]):
-            none_due &= now[:, j] > GUARD_EPS * sizes[:, j]
+        active = first + np.flatnonzero(model.system.active_guards(self.problem.parameters[0])[first:])
+        none_due = all_above(now - GUARD_EPS * sizes, 0.0, active)
         sizes[:, self.impacts] = np.maximum(sizes[:, self.impacts], MICROMETRE)
         exchanged = np.zeros((count, program.n_ledger))
         return np.concatenate([exchanged, sizes], axis=1) if program.n_ledger else sizes, none_due

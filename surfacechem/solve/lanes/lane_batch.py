@@ -83,9 +83,7 @@ RADAU = _method("by Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_
 
 def methods_of(problem: Problem) -> Iterator[LaneMethod]:
     """Yield the methods of a batch in lanes, each for what those before leave; none if its runs are solved alone."""
-    if problem.explicit:
-        if not problem.program.lanes:
-            return
+    if problem.explicit and problem.program.lanes:
         yield EXPLICIT
     if problem.implicit_lanes and problem.program.implicit_lanes:
         yield RADAU
