@@ -25,7 +25,6 @@ from surfacechem.mechanism import load_mechanism
 from surfacechem.quantities import AVOGADRO
 
 TOLERANCE = 1e-12
-KT = 1.380649e-23 * 298.15
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -142,19 +141,3 @@ def test_literature_numbers_come_back():
     assert tethers.equilibrium_constants[0] == pytest.approx(K * 5e-3, rel=1e-6)
     assert film.equilibrium_constants[0] == pytest.approx(K / (10e-6 * 1.0), rel=1e-6)  # m^2/kmol
     assert selectin.reverse_rate_constants[0] == pytest.approx(4.4e6 * 320e-9, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("name", "rate", "length"), [("l-selectin.yaml", 3.0, 4e-10), ("selectin-pulled.yaml", 0.02, 2.5e-10)]
-)
-@pytest.mark.parametrize("f", [0.0, 10e-12, 40e-12])
-def test_measured_rates_under_force_come_back(name, rate, length, f):
-    """Rupture of one bond at 298.15 K, and the equilibrium of ten bonds per open site that the spring shifts."""
-    mechanism = load(name, ["bond(s)"])
-    (law,) = mechanism.reactions
-    point = values(mechanism, 298.15, [1.0, 1.0], gap=f / 5.3e-3, force=f)
-    n = point["n_theta_bond_s"]
-    assert call(law.forward, point) == pytest.approx(n * rate * math.exp(f * length / KT), rel=1e-12)
-    if law.reversible:
-        constant = 10 * math.exp(-(f**2) / (2 * 5.3e-3 * KT))
-        assert call(law.reverse, point) == pytest.approx(constant * call(law.forward, point), rel=1e-6)

@@ -296,16 +296,6 @@ def one(cells: object, run: str, h: float = 1e-9, flux: object = 0.0, hot: float
     return Simulation(load_text(ONE.format(cells=cells, run=run, h=h, flux=flux, hot=hot)))
 
 
-def test_a_number_of_cells_that_is_too_small_for_the_layer_says_so():
-    run = one(2, "until: 1.2 us", flux=5e7).run()
-    exact = 300 + 2 * 5e7 * np.sqrt(run.dataset.time.values / np.pi) / EFFUSIVITY
-    true = abs(run.dataset["T_1"] / exact - 1).values.max()
-    assert true > 0.2
-    assert 0.9 * true < run.accuracy.error < 2 * true
-    assert "cells that suit" in run.accuracy.source
-    assert any("the error of" in warning for warning in run.warnings)
-
-
 def test_each_pulse_starts_a_layer_of_its_own():
     pulses = "{table: {times: [0 s, 0.1 s, 0.1 s, 0.2 s, 0.2 s, 1 s], values: [0, 0, 1e6, 1e6, 0, 0]}}"
     run = one("{accuracy: 1e-2, after: 5 ms}", "times: [0.1, 0.105, 0.15, 0.2, 0.205, 1.0]", flux=pulses).run()

@@ -97,17 +97,9 @@ REGIMES = {
         },
         lambda E: falling(1 / (0.7 / (300 + 0.7 * E / 16) + 0.3 / (300 + 0.3 * E / 14))),
     ),
-    "cohesion": (
-        {"friction": "mohr-coulomb: {mu: {value: 0.5, times: [power: {exponent: -4}]}, c: 4e5}"},
-        lambda E: falling(300 + E / 30, 0.5) + 0.2,
-    ),
     "static limit": (
         {"friction": "coulomb: {mu: {value: 0.6, times: [power: {exponent: -4}]}, mu_s: 0.7}"},
         lambda E: falling(300 + E / 30, 0.6),
-    ),
-    "linear fall": (
-        {"friction": "coulomb: {mu: {value: 0.7, times: [linear: {of: T_c, slope: -2e-3, about: 300}]}}"},
-        lambda E: 0.7 * (1 - 2e-3 * E / 30),
     ),
     "elastic": (
         {

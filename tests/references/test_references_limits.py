@@ -119,15 +119,6 @@ class TestExtremes:
         for reference in (get("endothermic-bonding")(**given), get("bonding")(**given, T_i=256.0)):
             assert float(reference.solution(t)["T"] / exact - 1) == pytest.approx(0.0, abs=1e-15)
 
-    @pytest.mark.parametrize("t", [1e-9, 10.0, 1e9])
-    @pytest.mark.parametrize("C_c", [1e3, 1e-15])
-    @pytest.mark.parametrize("h", [(1e-12, 1e20), (1e20, 1e-12), (3.0, 3.0), (1e20, 1e20), (700.0, 2500.0)])
-    def test_three_temperatures_with_many_digits(self, h, C_c, t):
-        given = {**MEDIUM, "h_1": h[0], "h_2": h[1], "C_c": C_c, "T_c": 300.0, **SOURCE}
-        actual = get("three-temperatures")(**given).solution(t)
-        for name, exact in zip(("T_1", "T_2", "T_c"), by_many_digits(given, t), strict=True):
-            assert float(actual[name] / exact - 1) == pytest.approx(0.0, abs=4e-15)
-
     @pytest.mark.parametrize("beta", [1e-9, 1e-3, 1.0, 100.0])
     def test_film_with_any_thinning(self, beta):
         with mpmath.workdps(80):
@@ -179,24 +170,6 @@ class TestExtremes:
             get("endothermic-bonding")(**BODIES, K_2=750.0, tau=1.0)
         with pytest.raises(InputError, match="T has no real value at t = "):
             get("bonding")(**BODIES, K_0=-2000.0, T_i=300.0, tau=1.0).solution([0.0, 9.0])
-
-
-@mpmath.workdps(120)
-def by_many_digits(p: dict[str, float], t: float) -> list[mpmath.mpf]:
-    """Temperatures of three capacities with sources, from the eigenvalues of the system in 120 digits."""
-    C_1, C_2, C_c, h_1, h_2, gamma = (mpmath.mpf(p[name]) for name in ("C_1", "C_2", "C_c", "h_1", "h_2", "gamma"))
-    rates = [[-h_1 / C_1, 0, h_1 / C_1], [0, -h_2 / C_2, h_2 / C_2], [h_1 / C_c, h_2 / C_c, -(h_1 + h_2) / C_c]]
-    values, vectors = mpmath.eig(mpmath.matrix(rates))
-    start = mpmath.lu_solve(vectors, mpmath.matrix([p["T_1"], p["T_2"], p["T_c"]]))
-    source = mpmath.lu_solve(vectors, mpmath.matrix([0, 0, 1 / C_c]))
-    result = mpmath.matrix(3, 1)
-    for i, value in enumerate(values):
-        e = value if abs(value) > 1e-60 else mpmath.mpf(0)
-        steady = mpmath.expm1(e * t) / e if e else mpmath.mpf(t)
-        decaying = (mpmath.exp(e * t) - mpmath.exp(-gamma * t)) / (e + gamma)
-        amplitude = mpmath.exp(e * t) * start[i] + source[i] * (p["D_0"] * steady + p["D_1"] * decaying)
-        result += vectors[:, i] * amplitude
-    return [mpmath.re(value) for value in result]
 
 
 @pytest.mark.parametrize("name", ["aging-velocity-steps", "slip-velocity-steps"])

@@ -10,7 +10,7 @@ from solved import Solved, closed, solve
 from surfacechem.format import load_text
 from surfacechem.laws.cohesive import TensileStrength
 from surfacechem.laws.factors import LinearInTemperature
-from surfacechem.laws.free_energy import BondEnergy, Constant, Penalty, TangentialStiffness
+from surfacechem.laws.free_energy import BondEnergy, Constant, Penalty
 from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.runs.simulation import Simulation
@@ -35,14 +35,6 @@ def test_a_limit_that_is_exceeded_from_the_start():
     assert solved.jumps[0].t == 0.0
     assert solved.events[:2] == ["slip backward", "stop"]
     assert solved["v"][-1] == 0.0
-
-
-@pytest.mark.parametrize(("mounting", "elastic"), [(Mounting(k=1e8), True), (Mounting(k=1e8, m=0.1, c_b=1e3), False)])
-def test_a_drive_that_swings_about_the_limit(mounting, elastic):
-    drive = Table(times=np.arange(41.0).tolist(), values=[(6e-4 + 1e-5 * (-1) ** n) * (n > 0) for n in range(41)])
-    potentials = [TangentialStiffness(E_t=1e10)] if elastic else []
-    solved = closed(slider(Coulomb(mu=0.6), mounting, drive, potentials=potentials), 40.0, exact=1e-7)
-    assert len(solved.jumps) < 200
 
 
 def test_friction_that_fades_with_temperature():
