@@ -410,20 +410,6 @@ def test_a_contact_closes_on_a_drive_that_has_reversed_in_the_air(by, stiffness,
     np.testing.assert_allclose(found["t_t"][late], -side * pull * (found.dataset.time[late] - 4.0), rtol=1e-8)
 
 
-@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-6, 1e-9])
-def test_what_follows_its_drive_without_friction_stops_with_it_in_no_unit_of_time(unit):
-    """Both are at rest together, and go on together; nothing happens to the interface."""
-    drive = {"times": [0.0, unit, 1.5 * unit, 3 * unit, 4 * unit], "values": [0.0, 2e-5, -8e-6, 8e-6, 8e-6]}
-    case = {
-        "bodies": {"slider": {"temperature": 300}, "base": {"temperature": 300}},
-        "interface": {"friction": [{"coulomb": {"mu": 0.5, "mu_s": 0.75}}]},
-        "mechanics": {"tangential": {"k": 1e10}},
-        "loading": {"p": {"table": {"times": [0.0, 0.5 * unit], "values": [1e4, 0.0]}}, "w_t": {"table": drive}},
-        "run": {"until": 4 * unit},
-    }
-    assert [jump.edge.name for jump in surfacechem.run(case).trajectory.jumps] == ["slip forward"]
-
-
 @pytest.mark.parametrize("rtol", [1e-11, 1e-12, 1e-13])
 @pytest.mark.parametrize("depth", ["2 um", "3 um"])
 def test_a_contact_that_closes_at_rest_sticks_whatever_roundoff_says(depth, rtol):

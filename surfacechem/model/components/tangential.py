@@ -32,7 +32,7 @@ from surfacechem.model.components.formulation import (
     in_series,
     name_traction,
 )
-from surfacechem.model.components.mounting import ACROSS, ALONG, LENGTH_SCALE, SECTIONS, FarField, far_field
+from surfacechem.model.components.mounting import ACROSS, ALONG, SECTIONS, FarField, far_field
 from surfacechem.model.components.sliding_friction import DRIVE, stands_for_velocity
 from surfacechem.model.constraints import plane
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
@@ -211,9 +211,9 @@ def _friction(
     follows = not (kind.slides_inertially or kind.rate_dependent)
     if follows:
         # While the limit is zero and does not grow, both slip directions are equivalent, and slip does not end, not
-        # even at rest: the constant, the scale of speeds, keeps the guard off zero.
+        # even at rest: the constant keeps the guard off zero and is below any speed.
         grows = build.total_derivative(limit)
-        back = {s: where(limit > 0, at, where(grows > 0, at, absolute(at) + LENGTH_SCALE)) for s, at in back.items()}
+        back = {s: where(limit > 0, at, where(grows > 0, at, absolute(at) + PICOMETRE)) for s, at in back.items()}
         # As a limit of zero begins to grow, slip goes on in the direction of the drive. With the growth of friction it
         # would be as much faster than free slip in one direction as it is slower in the other. At rest it stops.
         other = 2 * free_velocity(build, kind) - v
