@@ -263,11 +263,6 @@ class EmbeddedScene:
         """Names of the ledger's lines."""
         return tuple(account.quantity.name for account in self.model.system.ledger)
 
-    @cached_property
-    def entropic(self) -> NDArray[np.bool_]:
-        """A mask of the ledger's lines that are entropies."""
-        return np.array([account.kind.startswith("entropy") for account in self.model.system.ledger], dtype=bool)
-
     def account(self, name: str) -> int:
         """Return the index among the variables of the heat that a replaced body needs to keep its temperature."""
         wanted = f"H_T_{coupling.suffix_of(self.case.scene, name)}"

@@ -208,7 +208,7 @@ class StepWatcher:
         if not left or not self._halves:
             return np.asarray(found.sum(axis=0))
         # Within a load segment rates are smooth along the dense output, so that halving converges fast.
-        known = np.concatenate([np.append(item.x[: -len(item.ledger)], item.ledger) for item in self.interfaces])
+        known = np.concatenate([np.append(item.x[: len(item.scene.states)], item.ledger) for item in self.interfaces])
         allowed = self.net.rtol * (halves * (WEIGHTS @ np.abs(rates)) + np.abs(known))
         agree = np.all(halves * np.abs(LESS_GAUSS @ rates) <= allowed, axis=1)
         rough = [panel for panel, fine in zip(panels, agree, strict=True) if not fine]

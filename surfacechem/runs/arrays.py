@@ -350,7 +350,7 @@ class ArrayRuns:
         if set(self.keep.last) <= set(states):
             return {name: found.batch.ends[:, states[name]].copy() for name in self.keep.last}
         last, whole = found.last, found.batch.counts[:, END] == Status.FINISHED
-        if whole.any():  # rates from the equations, as at outputs
+        if self.reads_rates and whole.any():  # rates from the equations, as at outputs
             rows = last[whole]
             put_rates(self.model.program, rows)
             last[whole] = rows
