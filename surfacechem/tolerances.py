@@ -198,3 +198,6 @@ DRIFT = 100.0
 
 MOST_DRIFT = 0.1
 """Largest such residual relative to the terms, at any tolerance: a larger one has a known sign."""
+
+SINGULAR_NOISE = NEGLIGIBLE**2
+"""Noise above this part of a variable and of its typical size would mean a singular matrix, not roundoff."""

@@ -12,9 +12,8 @@ from surfacechem.compile.program import Program
 from surfacechem.model.system import Margin, State, System, TimeScale
 from surfacechem.solve.contract import REASONS, Array, Points, Result, Status
 from surfacechem.solve.hybrid import rounding
-from surfacechem.solve.radau.roundoff import SINGULAR_NOISE
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.tolerances import ATOL_OF_SCALE, CLOSED_GUARD, IDLE, NEGLIGIBLE, NEWTON_EPS, RUN_EPS
+from surfacechem.tolerances import ATOL_OF_SCALE, CLOSED_GUARD, IDLE, NEGLIGIBLE, NEWTON_EPS, RUN_EPS, SINGULAR_NOISE
 
 FEWEST, SHARP = 100.0, RUN_EPS
 """Fewest steps in a period that can resolve it, and the part of the time that a step can still resolve."""

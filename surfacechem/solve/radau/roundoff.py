@@ -12,7 +12,7 @@ import numpy as np
 from surfacechem.solve.radau.linear import LARGE_MATRIX, bound_real, solve_real
 from surfacechem.solve.radau.tables import GAMMA
 from surfacechem.solve.radau.work import RESIDUAL, clear, compiled, evaluate, set_inputs
-from surfacechem.tolerances import GUARD_EPS, NEGLIGIBLE, ULPS
+from surfacechem.tolerances import GUARD_EPS, NEGLIGIBLE, SINGULAR_NOISE, ULPS
 
 FIFTH_DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0)
 """Coefficients of a fifth difference, scaled so that it has the size of independent errors of the values."""
@@ -22,9 +22,6 @@ WINDOWS, TIME_SPACING = 3, NEGLIGIBLE
 
 MAGNIFIED = 10.0
 """Noise of the error estimate, which extrapolates the noise of every stage, in units of the noise of one residual."""
-
-SINGULAR_NOISE = NEGLIGIBLE**2
-"""Noise above this part of a variable and of its typical size would mean a singular matrix, not roundoff."""
 
 
 @compiled
