@@ -86,11 +86,12 @@ def increasing_root(
             following = np.where(shared, near, following)
             inside = (following > low) & (following < high)
             following = np.where(inside, following, 0.5 * (low + high))
-            step = np.minimum(np.abs(following - x), high - low)
+            # The values of other roots may put x far outside its bracket, whose width then tells nothing of the step.
+            step = np.abs(following - x)
             after = step**2 * np.where(np.isnan(bend), step / before**2, bend)
         reached = np.abs(error) <= rounding
         last = inside & (step <= SQRT_EPS * np.abs(x)) & (after <= FEW_EPS * np.abs(x))
-        goes_on = ~(reached | (step <= FEW_EPS * np.abs(x)) | last)
+        goes_on = ~(reached | (np.minimum(step, high - low) <= FEW_EPS * np.abs(x)) | last)
         x, before = np.where((error == 0.0) | (reached & ~inside), x, following), np.where(shared, 0.0, step)
         found[left] = x
         if not goes_on.all():  # most of the time is that of the function

@@ -225,6 +225,17 @@ def test_a_root_that_is_settled_is_not_evaluated_again():
     assert evaluated[-1] == [2]
 
 
+@pytest.mark.parametrize("function", [lambda x: (x**0.1, 0.1 * x**-0.9), lambda x: (x + x**3, 1 + 3 * x**2)])
+def test_roots_close_to_each_other_are_found_to_rounding(function):
+    """The values of one make the bracket of another narrow before that one is near it."""
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        roots = np.repeat(random.uniform(0.0, 1.0, 4), 3) * (1 + 1e-9 * np.tile([-1, 0, 1], 4))
+        start = random.uniform(0.0, 1.0, 12)
+        found = increasing_root(function, function(roots)[0], np.full(12, 1e-12), np.ones(12), start)
+        assert found == pytest.approx(roots, rel=1e-14)
+
+
 @pytest.mark.parametrize("power", [0.05, 0.5, 0.9])
 def test_a_path_from_and_to_a_singular_rate_is_known_to_rounding(power):
     """Of a rate x^p (1 - x)^p with p below one, from zero to one: its time is a beta function."""
