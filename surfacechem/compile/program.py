@@ -110,8 +110,6 @@ class Lanes:
     """For implicit steps: rates of the states alone."""
     slopes: "LaneFunction | None" = None
     """For implicit steps: derivatives of these rates by the states, row-major."""
-    divisors: tuple[bool, ...] = ()
-    """For explicit steps, where the rates have no narrow features: a flag for each state, true if they divide by it."""
 
 
 @dataclass(frozen=True)
@@ -174,6 +172,8 @@ class Program:
     """Compile the rates in explicit form; None if the equations cannot be solved for them one by one."""
     laned: Callable[[bool], Lanes | None] = lambda _: None
     """Compile the code for eight cases at once, True for implicit steps; None if that is not possible."""
+    divisors: tuple[bool, ...] = ()
+    """Where rates of states and accounts have no narrow features: a flag for each state, true if they divide by it."""
     margin_inputs: frozenset[int] = frozenset()
     """Positions of the inputs that margins read."""
     key: str | None = None
@@ -194,7 +194,7 @@ class Program:
         """Tables of a program for the stepper: its sizes (states, accounts, margins, inputs; in the core, chains, cells
         of chains; zeros for edges); a row (code, user data) for residual, jacobian, ledger, margins and rates, zero
         where absent; a mask of the algebraic states; a row (first, end, anchor) for each chain; the positions of the
-        computed derivatives; the group of each quadrature, -1 if it is in none; none of the flags of lanes.
+        computed derivatives; the group of each quadrature, -1 if it is in none; the divisors.
         """
         core = self.chains[0].first if self.chains else self.n
         sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core, 0, 0, 0
@@ -203,7 +203,7 @@ class Program:
         chains = np.array([(c.first, c.end, c.anchor) for c in self.chains], np.int64).reshape(-1, 3)
         groups = np.array(self.groups or (-1,) * self.n_ledger, np.int64)
         arrays = np.array(sizes, np.int64), np.array(code, np.int64), self.algebraic_mask, chains, self.nonzeros
-        return *arrays, groups, np.zeros(0, np.bool_)
+        return *arrays, groups, np.array(self.divisors, np.bool_)
 
     @cached_property
     def rates(self) -> Function | None:
@@ -229,14 +229,14 @@ class Program:
     def lane_tables(self, lanes: Lanes) -> tuple[NDArray[Any], ...]:
         """Return the tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs
         with constants, integrated columns); otherwise as the other tables, with a row for the constants, and with the
-        divisors.
+        divisors for explicit steps alone.
         """
         n_inputs = self.n_inputs + lanes.constants.n_out
         sizes = self.n, self.n_ledger, self.n_margins, n_inputs, self.n + self.n_ledger
         functions = lanes.states, lanes.slopes, None, lanes.margins, lanes.rates, lanes.constants
         code = [(f.address if f else 0, 0) for f in functions]
-        own = np.array(sizes, np.int64), np.array(code, np.int64)
-        return *own, *self.tables[2:-1], np.array(lanes.divisors, np.bool_)
+        own, divisors = (np.array(sizes, np.int64), np.array(code, np.int64)), () if lanes.states else self.divisors
+        return *own, *self.tables[2:-1], np.array(divisors, np.bool_)
 
     @cached_property
     def explicit_tables(self) -> tuple[NDArray[Any], ...]:
@@ -621,6 +621,7 @@ def _compiled_parts(
     known = {symbol for row in residual for symbol in row.free_symbols}
     read = {symbol for margin in margins for symbol in margin.free_symbols}
     return {
+        "divisors": _divisors(inputs, residual, derivatives, ledger),
         "residual": equations,
         "jacobian": slopes,
         "ledger": compile_function(inputs, ledger, own, steps=True) if ledger else None,
@@ -629,6 +630,21 @@ def _compiled_parts(
         "nonzeros": nonzeros,
         "margin_inputs": frozenset(j for j, symbol in enumerate(inputs) if symbol in read),
     }
+
+
+def _divisors(
+    inputs: Sequence[Any], residual: Sequence[Any], derivatives: Sequence[Any], ledger: Sequence[Any]
+) -> tuple[bool, ...]:
+    """Return the flags of :attr:`Program.divisors`; none where no explicit steps are taken: with chains, whose
+    equations are not given, in large networks, and if the equations cannot be solved for the rates.
+    """
+    from surfacechem.compile.vectors import divisors
+
+    few = len(residual) == len(derivatives) <= MOST_RATE_STATES
+    if not (rates := solved_rates(residual, derivatives) if few else None):
+        return ()
+    accounts = expanded(list(zip(derivatives, rates, strict=True)), ledger)
+    return divisors([*rates, *accounts], inputs[0], inputs[1 : 1 + len(rates)])
 
 
 @PREPARATION
@@ -652,7 +668,7 @@ def _compiled_lanes(
     """Return the code for eight cases at once; None if the equations do not give their rates explicitly, or are too
     many for implicit steps.
     """
-    from surfacechem.compile.vectors import compile_lanes, constants_apart, divisors
+    from surfacechem.compile.vectors import compile_lanes, constants_apart
 
     many = implicit and len(derivatives) > MOST_LANE_STATES
     rates = None if chains or many else solved_rates(expanded(named, residual), derivatives)
@@ -671,7 +687,6 @@ def _compiled_lanes(
         return Lanes(
             constants=compile_lanes(inputs, list(constants.values())),
             **{name: compile_lanes(given, part) for name, part in parts.items()},
-            divisors=() if implicit else divisors([*rates, *ledger], inputs[0], states),
         )
     except NotImplementedError:  # a function without vector code
         return None

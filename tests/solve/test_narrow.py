@@ -158,15 +158,28 @@ def test_a_sweep_ends_pieces_where_each_run_needs_it():
     np.testing.assert_array_equal([run.result.y for run in swept.runs], singly)
 
 
+@pytest.mark.parametrize("method", ["radau", "dop853"])
 @pytest.mark.parametrize("h", [0.02])
-def test_a_step_is_held_against_the_equations_between_its_stages(h):
+def test_a_step_is_held_against_the_equations_between_its_stages(h, method):
     """y' = a bell of time; without a look the first step is the whole run."""
     program = scalar(DY - se.exp(-(((T - 0.437) / h) ** 2)), Y * DY)
     asked = problem(program, [1.0], [0.0, 1.0], 1e-9)
     exact = 1.0 + h * np.sqrt(np.pi) / 2 * (erf(0.563 / h) + erf(0.437 / h))
-    found = solver("radau").solve(replace(asked, spacing=1 / 60))
+    found = solver(method).solve(replace(asked, spacing=1 / 60))
     assert found.y[0] == pytest.approx(exact, rel=1e-8)
     assert found.ledger[0] == pytest.approx(0.5 * (exact**2 - 1), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("rate", "ledger", "looked"),
+    [(T - Y, 1 / Y, False), (T - Y, se.exp(-Y), True), (T - Y, Y**5, True)],
+)
+def test_explicit_steps_are_held_against_equations_that_may_be_brief(rate, ledger, looked):
+    """A product of few states is not brief, nor is the inverse of one that hardly changes."""
+    asked = problem(scalar(DY - rate, ledger), [1.0], [0.0, 1.0], 1e-9, spacing=1 / 60)
+    found, blind = (solver("dop853").solve(each) for each in (asked, replace(asked, spacing=np.inf)))
+    assert (found.counters.residuals > blind.counters.residuals) == looked
+    assert np.array_equal(found.y, blind.y)
 
 
 def test_passages_are_found_in_any_number():

@@ -32,6 +32,7 @@ from surfacechem.solve.radau.explicit import (
     ERROR_PART,
     FOLLOWED_PART,
     MAX_ERROR_RATIO,
+    SMOOTH_PART,
     STABILITY_LIMIT,
     STIFF_STEP,
 )
@@ -329,11 +330,7 @@ def _agrees(w: Any, lane: int, x: Any) -> Any:
 
 @compiled
 def _may_be_narrow(w: Any) -> Any:
-    """Mask of lanes in whose steps the equations may change within less than the stages resolve.
-
-    Polynomials of a few states do not, if steps are not stiff and what they divide by changes by less than half of it.
-    A cubic polynomial lies between its Bezier coefficients.
-    """
+    """Mask of lanes in whose steps the equations may change within less than the stages resolve."""
     wide = lanes(w.stiff) < 0.5
     for m in range(w.n):
         if w.divisors[m]:
@@ -343,7 +340,7 @@ def _may_be_narrow(w: Any) -> Any:
                 smaller(smaller(first, near), smaller(far, last)),
                 larger(larger(first, near), larger(far, last)),
             )
-            wide = wide & ((least > 0.5 * most) | (most < 0.5 * least))
+            wide = wide & ((least > SMOOTH_PART * most) | (most < SMOOTH_PART * least))
     return ~wide
 
 

@@ -37,6 +37,11 @@ by which the rates change in a step once no state follows the fastest mode any m
 STIFF_STEPS = 15
 """Stiff steps after which the run continues implicitly; two that are not stiff cancel one."""
 
+SMOOTH_PART = 0.5
+"""Part of its largest size that a divisor keeps all over a step of smooth equations. It is then within a third of a
+constant: the powers of this third, of which its inverse is a series, soon vanish.
+"""
+
 MAX_ERROR_RATIO = 3.0
 """Largest ratio of the error of a repeated step to the one expected from its size; a larger one is noise, which
 implicit steps can measure, or a change of formula.
@@ -123,8 +128,8 @@ def mark_noise(w: Any, norm: float, expected: float) -> None:
 
 
 @compiled
-def is_stiff(w: Any) -> bool:
-    """True if steps have repeatedly been long compared with the fastest rate, which the last two stages estimate."""
+def _is_long(w: Any) -> bool:
+    """True if a step is long compared with the fastest rate, which the last two stages estimate."""
     k, largest, fastest, speed, change = w.k, 0.0, 0.0, 0.0, 0.0
     end, last = STAGES_OF_DENSE - 1, STAGES_OF_DENSE - 2
     for m in range(w.n):
@@ -134,8 +139,33 @@ def is_stiff(w: Any) -> bool:
             largest, fastest = apart * unit, apart / (abs(w.slopes[0, m] - w.slopes[4, m]) + TINY)
         speed, change = max(speed, abs(k[end, m]) * unit), max(change, abs(k[end, m] - k[0, m]) * unit)
     is_limited = fastest > STABILITY_LIMIT and change < FOLLOWED_PART * fastest * speed
-    w.stiff_steps = w.stiff_steps + 2 if fastest > STIFF_STEP or is_limited else max(w.stiff_steps - 1, 0)
+    return bool(fastest > STIFF_STEP or is_limited)
+
+
+@compiled
+def is_stiff(w: Any) -> bool:
+    """True if steps have repeatedly been long compared with the fastest rate."""
+    w.stiff_steps = w.stiff_steps + 2 if _is_long(w) else max(w.stiff_steps - 1, 0)
     return bool(w.stiff_steps >= 2 * STIFF_STEPS)
+
+
+@compiled
+def may_be_narrow(w: Any, h: float) -> bool:
+    """True if the equations may change within less than the stages of a step resolve.
+
+    Polynomials of a few states do not, if steps are not stiff and what they divide by changes by less than half of it.
+    A cubic polynomial lies between its Bezier coefficients.
+    """
+    if w.explicit == 0 or w.divisors.shape[0] == 0 or _is_long(w):
+        return True
+    wide, end = True, STAGES_OF_DENSE - 1
+    for m in range(w.n):
+        if w.divisors[m]:
+            first, last = w.y[m], w.y[m] + h * w.slopes[0, m]
+            near, far = first + h / 3.0 * w.k[0, m], last - h / 3.0 * w.k[end, m]
+            least, most = min(first, near, far, last), max(first, near, far, last)
+            wide = wide and (least > SMOOTH_PART * most or most < SMOOTH_PART * least)
+    return not wide
 
 
 @compiled

@@ -26,7 +26,15 @@ from surfacechem.solve.radau.dense import (
     probe_ledger,
     put_inside,
 )
-from surfacechem.solve.radau.explicit import DENSEST, defect_of_rates, is_stiff, mark_noise, put_rates, step_explicitly
+from surfacechem.solve.radau.explicit import (
+    DENSEST,
+    defect_of_rates,
+    is_stiff,
+    mark_noise,
+    may_be_narrow,
+    put_rates,
+    step_explicitly,
+)
 from surfacechem.solve.radau.linear import solve_real
 from surfacechem.solve.radau.newton import (
     CONVERGED,
@@ -542,6 +550,8 @@ def first_defect(w: Any, h: float, spacing: float, remaining: float, begins: boo
     ``begins`` and ``ends`` tell whether the step touches an end of a segment or an event, next to which a feature may
     be narrow.
     """
+    if not may_be_narrow(w, h):
+        return 1.0
     points = int(h / spacing)
     if points > 0 or begins or ends:
         keep_polynomial(w)

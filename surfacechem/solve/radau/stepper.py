@@ -41,7 +41,7 @@ BATCH: dict[str, tuple[Any, int]] = {
     # positions of the derivatives that are formed; empty if all are
     "nonzeros": (np.int64, 1),
     "groups": (np.int64, 1),
-    # for lanes, of equations without narrow features: flags of the states that they divide by; else empty
+    # for explicit steps, of equations without narrow features: flags of the states that they divide by; else empty
     "divisors": (np.bool_, 1),
     # address and lengths of each table of edges: one array is unpacked faster than seven
     "edge_words": (np.int64, 1),
