@@ -89,6 +89,7 @@ def without_stall(problem: Problem, velocities: NDArray[np.bool_]) -> Flow[Resul
 def rounding(result: Result) -> Array:
     """Return the uncertainty of each unknown at the end of a run from roundoff of its equation, shape (states,)."""
     problem, n = result.problem, len(result.y)
+    # What stalls at a breakpoint does so in the segment that begins there.
     parameters = problem.parameters[np.searchsorted(problem.segments[1:-1], result.t, side="right")]
     inputs = np.concatenate(([result.t], result.y, result.ydot, parameters))
     both = problem.program.derivatives(problem.program.filled(inputs))
