@@ -172,7 +172,7 @@ def _temperatures(ax: Any, run: Any, *names: str) -> None:
 
 
 def force_spectrum() -> Figure:
-    """Rupture forces over six decades of loading rate on the exact lines."""
+    """Rupture forces over six decades of loading rate, and the exact ones."""
     return plots.figure(surfacechem.sweep("force-spectroscopy").dataset)
 
 

@@ -318,7 +318,7 @@ def figure_of_rupture(dataset: xarray.Dataset, load: str, variables: Sequence[st
             if name:
                 _draw_series(ax, dataset, load, name)
             else:
-                # Most probable, median and mean load at rupture, the exact ones as lines.
+                # Most probable, median and mean load at rupture, the exact ones as rings.
                 mean = dataset[f"{load}_mean"]
                 text, size = style.prefixed(unit(mean), mean.values)
                 _draw_statistics(ax, dataset, {f"{load}_{which}": word for which, word in STATISTICS.items()}, size)
@@ -384,27 +384,28 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
 
 def _draw_statistics(ax: Axes, dataset: xarray.Dataset, words: Mapping[str, str], size: float) -> None:
     """Draw results of each run over the swept parameter, by name with their labels in the legend, in one colour for
-    each or for each value of a second parameter; exact values as lines.
+    each or for each value of a second parameter; exact values as black rings, as they are known at these points only.
     """
     parameter = dataset[str(dataset["status"].dims[0])]
     style.draw_parameter(ax.xaxis, parameter)
     x, large = parameter.values, 3.5 if len(parameter) < MOST_LARGE_MARKERS else 2.0
     seconds = [label for _, label in style.curves_by_second(dataset, dataset[next(iter(words))].values)]
     for k, (name, marker) in enumerate(zip(words, MARKERS, strict=False)):
-        for fmt, end in ((marker, ""), ("-", "_exact")):
-            if name + end in dataset:
-                for j, (values, _) in enumerate(style.curves_by_second(dataset, final_values(dataset, name + end))):
-                    colour = COLOURS[j if len(seconds) > 1 else k]
-                    ax.plot(x, values / size, fmt, color=colour, markersize=large, linewidth=0.9, label="_")
+        for j, (values, _) in enumerate(style.curves_by_second(dataset, final_values(dataset, name))):
+            colour = COLOURS[j if len(seconds) > 1 else k]
+            ax.plot(x, values / size, marker, color=colour, markersize=large, label="_")
     for label, colour in zip(seconds if len(seconds) > 1 else (), COLOURS, strict=False):
         ax.plot([], [], color=colour, label=label)
     for word, marker, colour in zip(words.values(), MARKERS, COLOURS, strict=False):
         ax.plot([], [], marker, color="black" if len(seconds) > 1 else colour, markersize=large, label=word)
-    ax.plot([], [], color="black", linewidth=0.9, label="exact" if any(f"{n}_exact" in dataset for n in words) else "_")
+    for k, name in enumerate(f"{name}_exact" for name in words if f"{name}_exact" in dataset):
+        for j, (values, _) in enumerate(style.curves_by_second(dataset, final_values(dataset, name))):
+            kw: dict[str, Any] = {"fillstyle": "none", "markeredgewidth": 0.6, "label": "_" if k or j else "exact"}
+            ax.plot(x, values / size, "o", color="black", markersize=large + 2, **kw)
 
 
 def lifetimes(dataset: xarray.Dataset) -> Figure:
-    """Draw the lifetime over the swept parameter, the exact one as a line, and the survival over time of some runs."""
+    """Draw the lifetime over the swept parameter, the exact one as rings, and the survival over time of some runs."""
     with style.panels(6.4, 5.3, 2) as (plot, grid):
         above, below = grid[:, 0]
         _draw_statistics(above, dataset, {"lifetime": "runs"}, 1.0)
