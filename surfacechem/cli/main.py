@@ -310,9 +310,7 @@ def schema() -> None:
 
 @app.command(epilog=EXIT_CODES)
 def cases(
-    name: Annotated[
-        str | None, Option("--show", metavar="NAME", help="Print this case.", autocompletion=case_names)
-    ] = None,
+    name: Annotated[str | None, Argument(help="Print this case.", autocompletion=case_names)] = None,
 ) -> None:
     """List the cases that come with the package, or print one."""
     from surfacechem.runs.listing import case_table, case_text

@@ -300,7 +300,7 @@ class TestListings:
 
 def test_a_case_of_ones_own_begins_with_a_shipped_one(call, tmp_path):
     text = (data.cases() / "stick-slip.yaml").read_text()
-    assert call("cases", "--show", "stick-slip").stdout == text
+    assert call("cases", "stick-slip").stdout == text
     assert call("new", "mine.yaml", "--from", "stick-slip").exit_code == 0
     assert (tmp_path / "mine.yaml").read_text() == text
     again = call("new", "mine.yaml")
