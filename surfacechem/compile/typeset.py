@@ -26,13 +26,16 @@ from surfacechem.compile.printing import LATEX_ESCAPES, RELATIONS, Latex, quanti
 from surfacechem.expressions import EXPONENT_CAP, LARGE_EXPONENT, LITERAL, Expression, derivative
 from surfacechem.model.system import Named, System
 from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEFAN_BOLTZMANN
-from surfacechem.tolerances import EQUAL, FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE
+from surfacechem.tolerances import EQUAL, FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE, TINY
 
 EXPONENT_CAPS = (EXPONENT_CAP, LARGE_EXPONENT, LITERAL, -30.0)
 """Exponents up to which a formula is valid without its guard."""
 
 FLOORS = (FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE)
 """Amounts above which a formula is valid without its guard."""
+
+OFF_ZERO = (TINY, TINY**0.5)
+"""Numbers that, added, keep a divisor or the base of a power off zero; the second one where it is squared."""
 
 K_B, R, N_A = map(symengine.Symbol, ("Boltzmann constant", "gas constant", "Avogadro constant"))
 
@@ -170,7 +173,9 @@ def readable(expression: Expression) -> Expression:
 
 
 def _constant(value: float) -> Expression:
-    """Return a number as a simple multiple of a constant of nature, or as an integer, if it is one."""
+    """Return a number as a simple multiple of a constant of nature, or as an integer, if it is one; a guard is zero."""
+    if abs(value) in OFF_ZERO:
+        return symengine.Integer(0)
     if value == round(value) and abs(value) < 1 / EQUAL:
         return symengine.Integer(round(value))
     for (name, (size, _)), power, factor in product(CONSTANTS.items(), (1, -1), FACTORS):
@@ -184,7 +189,7 @@ def _unguarded(values: Sequence[Any], conditions: Sequence[Any]) -> Expression:
     first, condition = values[0], conditions[0]
     if condition == False:  # noqa: E712 - an expression, not a flag
         return _unguarded(values[1:], conditions[1:])
-    if len(values) == 1 or condition == True or _is_cap(condition):  # noqa: E712
+    if len({*values}) == 1 or condition == True or _is_cap(condition):  # noqa: E712
         return first
     low, high = condition.args
     if [*values] == [1, -1, 0]:

@@ -68,7 +68,7 @@ TABLE = """
 alpha α  beta β  delta δ  Delta Δ  eta η  theta θ  kappa κ  lambda λ  mu μ  nu ν  pi π  Pi Π  rho ρ  sigma σ
 Sigma Σ  tau τ  phi φ  psi ψ  Psi Ψ  omega ω  varepsilon ε  epsilon ε  chi χ  gamma γ  xi ξ  ge ≥  le ≤  cdot ·
 times ×  partial ∂  infty ∞  pm ±  to →  int ∫  sum Σ  prod Π  approx ≈  simeq ≃  propto ∝  ll ≪  gg ≫  ne ≠
-langle ⟨  rangle ⟩  ell ℓ  Lambda Λ  Phi Φ
+langle ⟨  rangle ⟩  ell ℓ  Lambda Λ  Phi Φ  wedge ∧  vee ∨
 """
 SIGNS = dict(zip(TABLE.split()[::2], TABLE.split()[1::2], strict=True))
 """LaTeX commands with one character; function names keep their letters."""
@@ -88,19 +88,22 @@ def plain(latex: str) -> str:
     >>> plain(chr(92) + "dot" + chr(92) + "phi = -" + chr(92) + "frac{M}{N_c}")
     'dφ/dt = -M/N_c'
     """
-    text = re.sub(r"\\q?quad", "\0", re.sub(r"\\(?:left|right)\b|\\[,!; ]|&", " ", latex))
+    text = re.sub(r"\s*\\\\\s*", "; ", latex.replace(r"\begin{cases}", "(").replace(r"\end{cases}", ")"))
+    text = re.sub(r"\\q?quad", "\0", re.sub(r"\\(?:left|right)\b|\\[,!;: ]|&", " ", text))
     text = re.sub(r"(?<=\w)(?=\\)", " ", text)
     text = re.sub(r"\\([A-Za-z]+)", lambda m: SIGNS.get(m[1], m[0]), text)
-    text = re.sub(rf"\\dot{ACCENTED}(_\{{(?:[^{{}}]|\{{[^{{}}]*\}})*\}}|_\w)?", r"d\1\2\3/dt ", text)
+    for command, power in (("dot", ""), ("ddot", "²")):
+        rate = rf"d{power}\1\2\3/dt{power} "
+        text = re.sub(rf"\\{command}{ACCENTED}(_\{{(?:[^{{}}]|\{{[^{{}}]*\}})*\}}|_\w)?", rate, text)
     text = re.sub(rf"\\bar{ACCENTED}", r"\1\2_mean ", text)
     text = re.sub(rf"\\hat{ACCENTED}", r"\1\2_max ", text)
-    text = re.sub(r"\\(?:text|mathrm|operatorname)\s*\{([^{}]*)\}", r"\1", text)
+    text = re.sub(r"\\(?:text|mathrm|mathcal|operatorname)\s*\{([^{}]*)\}", r"\1", text)
     text = re.sub(rf"\\({FUNCTIONS})\b\s*(?=\w)", r"\1 ", text)
     text = re.sub(rf"\\({FUNCTIONS})\b", r"\1", text)
     while (reduced := _unnested(text)) != text:
         text = reduced
     text = re.sub(r"\\([a-zA-Z]+)", r"\1", text).replace("\\{", "(").replace("\\}", ")")
-    text = re.sub(r"\s+([,)\]⟩])|\s*(\0)\s*", r"\1\2", re.sub(r"\s+", " ", text))
+    text = re.sub(r"\s+([,;)\]⟩])|\s*(\0)\s*", r"\1\2", re.sub(r"\s+", " ", text))
     text = re.sub(r"([(\[/⟨]) ", r"\1", text.replace(" /", "/")).replace("\0", "  ").strip()
     return re.sub(r"(?<=[=(,] -) (?=\w)|(?<=\(-) (?=\w)", "", re.sub(rf"\b({FUNCTIONS}) \(", r"\1(", text))
 
@@ -113,6 +116,7 @@ def _unnested(text: str) -> str:
     text = re.sub(rf"\\[dt]?frac{either}{either}", lambda m: f"{_atom(m[1] or m[2])}/{_atom(m[3] or m[4])} ", text)
     text = re.sub(rf"\\sqrt{either}", r"sqrt(\1\2)", text)
     text = re.sub(rf"\^{inner}", lambda m: f"^{_atom(m[1])}", text)
+    text = re.sub(rf"(\b{FUNCTIONS}){inner}", r"\1\2", re.sub(rf"\|{inner}\s*\|", r"|\1|", text))  # sin{(x)}, |{x}|
     return re.sub(rf"_{inner}", lambda m: f"_({m[1]})" if " " in m[1].strip() else f"_{m[1]}", text)
 
 

@@ -5,8 +5,10 @@ import pytest
 import symengine
 from case_runs import load
 
-from surfacechem.compile.typeset import CONSTANTS, equations, readable, statements
+import surfacechem
+from surfacechem.compile.typeset import CONSTANTS, PaperPrinter, equations, readable, statements
 from surfacechem.expressions import where
+from surfacechem.runs.listing import plain
 
 pytestmark = pytest.mark.around
 
@@ -67,3 +69,39 @@ def test_what_is_no_guard_stays():
     assert readable(where(x < 0, -x, x)) == abs(x)
     kept = where(x > y, x**2, y)
     assert readable(kept) == kept
+
+
+def as_text(system):
+    return [plain(" ".join((line.left, *line.pieces))) for line in equations(system)[0]]
+
+
+def test_the_fall_of_friction_has_no_guard_at_rest():
+    law = {"stribeck": {"mu_s": 0.5, "mu_k": 0.3, "v_s": "2 mm/s", "delta": 1.0}}
+    heat = {"temperature": "T", "capacity": "constant", "C": "20 kJ/m^2/K"}
+    slider = {
+        "T_0": "293 K",
+        "bodies": {"block": heat, "base": heat},
+        "interface": {"temperature": "T", "friction": [law]},
+        "mechanics": {"tangential": {"k": "5 kPa/mm", "m": "500 kg/m^2"}},
+        "loading": {"p": "50 kPa", "w_t": {"ramp": {"rate": "0.5 mm/s"}}},
+        "initial": {"T": "293 K"},
+        "run": {"until": "30 s"},
+    }
+    fall = "p (μ_k + (μ_s - μ_k) exp(- (v/v_s)^δ))"
+    falls = [f"t_stribeck = -{fall.replace('(v', '(-v')}", f"t_stribeck = {fall}", "t_stribeck = 0"]
+    assert as_text(surfacechem.load(slider).system)[-3:] == falls
+
+
+def test_a_turn_of_sliding_has_no_guard_at_rest():
+    turn = next(line for line in as_text(load("anisotropic-slide").system) if line.startswith("0 = dα/dt"))
+    assert "10^-146" not in turn
+
+
+def test_choices_and_functions_are_text_without_words_of_latex():
+    x, y = symengine.symbols("x y")
+    inner = where(x > 0, abs(y), symengine.sin(x) + 1)
+    shown = PaperPrinter({}).text(where(symengine.And(x < 1, y < 2), inner**2 / y, y))
+    assert plain(shown) == "(((|y|^2 for x > 0; (sin(x) + 1)^2 otherwise))/y for x < 1 ∧ y < 2; y otherwise)"
+    assert plain(r"m\,\ddot{g}_n = \mathcal{F}\left(g_n\right)") == "m d²g_n/dt² = F (g_n)"
+    rate = as_text(load("rate-and-state-stick-slip").system)
+    assert "(d ln θ)/(d t) = e^(-ln θ) - (|v|)/L" in rate
