@@ -49,6 +49,9 @@ TEXT_DIMENSIONS = {"status": POINT_DIMENSIONS, **{name: (dimension,) for dimensi
 # logarithmic axis.
 LEAST_ERROR = EPS / 16
 
+SOLVER_COLOURS = (*COLOURS, "black")
+"""Colours of solvers, one more than there are markers, so that no pair of both is repeated early."""
+
 BELOW, STEPPING = "below the uncertainty of the reference", "inside the library's own steps"
 
 
@@ -61,7 +64,8 @@ def precision(dataset: xarray.Dataset) -> Figure:
     """
     style.check_variables(dataset, NUMBER_DIMENSIONS, TEXT_DIMENSIONS)
     drawn = [name for name in ERRORS if bool((dataset[name] > 0).any())] or ["energy_error"]
-    rows, markers = dataset.sizes["case"], list(zip(cycle(COLOURS), "osD^vPX" * dataset.sizes["solver"], strict=False))
+    rows, solvers = dataset.sizes["case"], dataset.sizes["solver"]
+    markers = list(zip(cycle(SOLVER_COLOURS), "osD^vPX" * solvers, strict=False))
     with style.panels(0.6 + 3.2 * len(drawn), 0.7 + 2.6 * rows, rows, len(drawn), sharey="row") as (plot, grid):
         for i in range(rows):
             case = dataset.isel(case=i)
@@ -70,7 +74,7 @@ def precision(dataset: xarray.Dataset) -> Figure:
                 for axis in (ax.xaxis, ax.yaxis):
                     axis.set_minor_formatter(NullFormatter())  # labels within a decade would overlap
                 limit = float(case[name.replace("error_", "uncertainty_")]) if name.startswith("error_") else np.nan
-                for k in range(dataset.sizes["solver"]):
+                for k in range(solvers):
                     _draw_solver(ax, case.isel(solver=k), name, limit, *markers[k])
                 if np.isfinite(limit):
                     ax.axvspan(LEAST_ERROR, max(limit, LEAST_ERROR), color="0.5", alpha=0.12, linewidth=0)
