@@ -79,8 +79,12 @@ class Tree:
         kinds = {dict: "a mapping", list: "a list", type(None): "nothing", bool: str(self.value).lower()}
         return kinds.get(type(self.value)) or f"'{str(self.value)[:40]}'"
 
-    def mapping(self, known: Iterable[str] | None = None, what: str = "keys") -> dict[str, Tree]:
-        """Return the entries of a mapping, which may be empty; InputError for unknown keys."""
+    def mapping(
+        self, known: Iterable[str] | None = None, what: str = "keys", elsewhere: Mapping[str, str] | None = None
+    ) -> dict[str, Tree]:
+        """Return the entries of a mapping, which may be empty; InputError for unknown keys, with the place of those
+        that belong ``elsewhere``.
+        """
         if self.value is None:
             return {}
         allowed = None if known is None else list(known)
@@ -90,7 +94,9 @@ class Tree:
         for key, child in self.value.items():
             if allowed is not None and key not in allowed:
                 place = replace(child.place, path=self.place.path)
-                raise InputError(f"unknown key '{key}'.{suggestion(key, allowed)}", place)
+                home = (elsewhere or {}).get(key)
+                hint = f" It belongs {home}; see to its indentation." if home else suggestion(key, allowed)
+                raise InputError(f"unknown key '{key}'.{hint}", place)
         return dict(self.value)
 
     def items(self, example: str = "") -> list[Tree]:

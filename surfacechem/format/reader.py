@@ -88,10 +88,10 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     Names of temperatures and species, which other sections may use, are given by the bodies and the interface, so that
     they are collected first.
     """
-    top = tree.mapping(keys(Document))
-    nothing = Tree(None, tree.place)
+    nothing, outer, inner = Tree(None, tree.place), keys(Document), keys(InterfaceSection)
+    top = tree.mapping(outer, elsewhere=dict.fromkeys(inner, "under `interface`"))
     bodies = top.get("bodies", nothing).mapping()
-    interface = top.get("interface", nothing).mapping(keys(InterfaceSection))
+    interface = top.get("interface", nothing).mapping(inner, elsewhere=dict.fromkeys(outer, "at the top level"))
     if "bodies" in top and len(bodies) != 2:
         raise top["bodies"].error(f"exactly two bodies are needed, not {len(bodies)}; the first is body 1.")
     for name, body in bodies.items():

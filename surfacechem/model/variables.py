@@ -36,7 +36,7 @@ REMEDIES = {
     "phi": "Give `phi` under `initial` and a law under `bonding`, or prescribe `phi` under `loading`.",
     "T_0": "Give the reference temperature `T_0` at the top of the case.",
     "T_c": "Give `interface.temperature`, or both bodies a temperature.",
-    "N_c": "Give `interface.sites`.",
+    "N_c": "Give `interface.sites`, or the force on a single bond, `f` under `loading`.",
     "n_c": "Give `interface.sites`.",
     "n_1": "Give `interface.sites`.",
     "n_2": "Give `interface.sites`.",

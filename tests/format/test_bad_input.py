@@ -57,6 +57,8 @@ MISTAKES = [
     ("upper: {temperature: T,", "upper: {temperature: mu,", "4: bodies.upper.temperature: 'mu' cannot name a temper"),
     ("upper: {temperature: T,", "upper: {temperature: T_1,", "4: bodies.upper.temperature: 'T_1' is temperature of"),
     ("bodies:", "bodys:", "2: unknown key 'bodys'. Did you mean 'bodies'? Known: T_0, bodies,"),
+    ("heat:", "friction: []\nheat:", "14: unknown key 'friction'. It belongs under `interface`; see"),
+    ("  bonding:", "  loading: {}\n  bonding:", "12: interface: unknown key 'loading'. It belongs at the top level;"),
     ("- bond-energy: {K_0", "- bond-enrgy: {K_0", "9: interface.potential.bond-enrgy: no potential law 'bond-enrgy'. "),
     ("- bond-energy: {K_0: 300 J/m^2}", "- []", "9: interface.potential[1]: a law is one entry, `name: {parameters}`,"),
     ("- bond-energy: {K_0: 300 J/m^2}", "- {value: 1, times: 2}", "`name: {parameters}`, not several: value, times."),
