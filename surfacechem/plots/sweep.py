@@ -390,18 +390,25 @@ def _draw_statistics(ax: Axes, dataset: xarray.Dataset, words: Mapping[str, str]
     style.draw_parameter(ax.xaxis, parameter)
     x, large = parameter.values, 3.5 if len(parameter) < MOST_LARGE_MARKERS else 2.0
     seconds = [label for _, label in style.curves_by_second(dataset, dataset[next(iter(words))].values)]
-    for k, (name, marker) in enumerate(zip(words, MARKERS, strict=False)):
-        for j, (values, _) in enumerate(style.curves_by_second(dataset, final_values(dataset, name))):
-            colour = COLOURS[j if len(seconds) > 1 else k]
-            ax.plot(x, values / size, marker, color=colour, markersize=large, label="_")
+    for name, marker, own in zip(words, MARKERS, COLOURS, strict=False):
+        for (values, _), colour in zip(
+            style.curves_by_second(dataset, final_values(dataset, name)), COLOURS, strict=False
+        ):
+            ax.plot(x, values / size, marker, color=colour if len(seconds) > 1 else own, markersize=large, label="_")
     for label, colour in zip(seconds if len(seconds) > 1 else (), COLOURS, strict=False):
         ax.plot([], [], color=colour, label=label)
     for word, marker, colour in zip(words.values(), MARKERS, COLOURS, strict=False):
         ax.plot([], [], marker, color="black" if len(seconds) > 1 else colour, markersize=large, label=word)
-    for k, name in enumerate(f"{name}_exact" for name in words if f"{name}_exact" in dataset):
-        for j, (values, _) in enumerate(style.curves_by_second(dataset, final_values(dataset, name))):
-            kw: dict[str, Any] = {"fillstyle": "none", "markeredgewidth": 0.6, "label": "_" if k or j else "exact"}
-            ax.plot(x, values / size, "o", color="black", markersize=large + 2, **kw)
+    _draw_rings(ax, dataset, [f"{name}_exact" for name in words if f"{name}_exact" in dataset], size, large + 2)
+
+
+def _draw_rings(ax: Axes, dataset: xarray.Dataset, names: Sequence[str], size: float, width: float) -> None:
+    """Draw exact results of each run as black rings [pt]."""
+    x = dataset[str(dataset["status"].dims[0])].values
+    found = [values for name in names for values, _ in style.curves_by_second(dataset, final_values(dataset, name))]
+    for j, values in enumerate(found):
+        look: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": width, "markeredgewidth": 0.6}
+        ax.plot(x, values / size, "o", label="_" if j else "exact", **look)
 
 
 def lifetimes(dataset: xarray.Dataset) -> Figure:
