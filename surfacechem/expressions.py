@@ -224,7 +224,7 @@ def polynomial(x: Expression, coefficients: Sequence[Expression]) -> Expression:
     return reduce(lambda value, coefficient: value * x + coefficient, reversed(coefficients))
 
 
-def cubics(
+def monotone_cubics(
     x: Expression, at: Sequence[float], values: Sequence[float], before: Expression, beyond: Expression
 ) -> Expression:
     """Return monotone cubics through points, with other values before the first and beyond the last of them.

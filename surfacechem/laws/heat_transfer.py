@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 
 from surfacechem.contracts.terms import HeatTransfer, UnderPressure, option, parameter
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, cubics, exp, positive, power
+from surfacechem.expressions import Expression, exp, monotone_cubics, positive, power
 from surfacechem.quantities import STEFAN_BOLTZMANN
 
 
@@ -209,7 +209,7 @@ class ConductanceTable(HeatTransfer):
         at, values, linear = self._at, self.conductances, self.extrapolation == "linear"
         slopes = PchipInterpolator(at, values)((at[0], at[-1]), 1).tolist() if linear else (0.0, 0.0)
         before, beyond = (values[k] + slopes[k] * (x - at[k]) for k in (0, -1))
-        result = cubics(x, at, values, before, beyond)
+        result = monotone_cubics(x, at, values, before, beyond)
         return positive(result) if linear else result
 
 

@@ -18,7 +18,7 @@ from typing import ClassVar
 
 from surfacechem.contracts.terms import PairEnergy, Potential, option, parameter
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, cubics, is_symbolic, log, positive, where
+from surfacechem.expressions import Expression, is_symbolic, log, monotone_cubics, positive, where
 
 REPULSION_WALL = 0.01
 """Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, continues as a parabola."""
@@ -404,7 +404,7 @@ class PairTable(PairEnergy):
         """Return the energy of a pair [J]."""
         x, psi = self.distances, self.energies
         power = math.log(psi[0] / psi[1]) / math.log(x[0] / x[1])
-        return cubics(r, x, psi, psi[0] * (r / x[0]) ** power, 0.0 * r)
+        return monotone_cubics(r, x, psi, psi[0] * (r / x[0]) ** power, 0.0 * r)
 
 
 def _power(m: float, unit: float) -> PairEnergy:

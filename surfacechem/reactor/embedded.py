@@ -392,6 +392,7 @@ class EmbeddedScene:
         count, random = len(self.states), np.random.default_rng(0)
         samples = 2 * count + SPARE_SAMPLES
         about = x[:count] + NEARBY * random.random((samples, count)) * self._sizes(x)
+        # Any length before the next breakpoint will do: rates that histories change are no fixed combination in it.
         following = min((b for b in self.breakpoints if b > t), default=np.inf)
         times = t + random.random(samples) * min(following - t, 1.0)
         parameters = np.repeat(self.evaluation.parameters[None], samples, axis=0)

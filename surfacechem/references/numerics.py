@@ -60,7 +60,7 @@ def increasing_root(
     high], or comes as near as the ``rounding`` of the target; ``along`` are its further arguments, one for each root.
 
     Newton's method inside a shrinking bracket, from `low` unless a better guess is given. Without further arguments all
-    roots are of one function: cubics through the first values on both sides of each give the next guess. It ends when
+    roots are of one function: inverse Hermite interpolation between the first values gives the next guess. It ends when
     the next step, predicted by quadratic convergence, is below the last digit, since rounding causes such steps without
     end.
 
@@ -116,14 +116,14 @@ def _between(x: Array, value: Array, slope: Array, target: Array, low: Array, hi
     low, high = np.where(is_inside, np.maximum(low, x_0), low), np.where(is_inside, np.minimum(high, x_1), high)
     bend = np.abs(slope_1 - slope_0) / (slope_1 + slope_0) / (x_1 - x_0)
     alike = is_inside & (slope_1 < 2 * slope_0) & (slope_0 < 2 * slope_1)
-    guess = cubic(target, (f_0, f_1), (x_0, x_1), (1 / slope_0, 1 / slope_1))
+    guess = hermite(target, (f_0, f_1), (x_0, x_1), (1 / slope_0, 1 / slope_1))
     return np.where(alike, guess, np.nan), low, high, np.where(alike, bend, np.nan)
 
 
-def cubic(t: Array, times: tuple[Array, Array], values: tuple[Array, Array], slopes: tuple[Array, Array]) -> Array:
-    """Return the cubics with these values and slopes at two times each.
+def hermite(t: Array, times: tuple[Array, Array], values: tuple[Array, Array], slopes: tuple[Array, Array]) -> Array:
+    """Return the cubic Hermite polynomials with these values and slopes at two times each.
 
-    >>> float(cubic(np.array(0.5), (np.array(0.0), np.array(1.0)), (np.array(0.0), np.array(1.0)), (0.0, 3.0)))
+    >>> float(hermite(np.array(0.5), (np.array(0.0), np.array(1.0)), (np.array(0.0), np.array(1.0)), (0.0, 3.0)))
     0.125
     """
     length, rise = times[1] - times[0], values[1] - values[0]
@@ -228,7 +228,7 @@ class AutonomousODE:
         left, shares = right - 1, 0.5 * (1.0 + self.nodes)
         with np.errstate(all="ignore"):
             slopes = 0.5 / slowness[row, left], 0.5 / slowness[row, right]
-            guess = cubic(t, (times[row, left], times[row, right]), (shares[left], shares[right]), slopes)
+            guess = hermite(t, (times[row, left], times[row, right]), (shares[left], shares[right]), slopes)
         return np.where(t > 0.0, np.nan_to_num(guess), 0.0)
 
 
