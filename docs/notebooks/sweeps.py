@@ -17,7 +17,7 @@ folder = Path(tempfile.mkdtemp())
 # %% [markdown]
 # ## The force at rupture over seven decades of loading rate
 #
-# Every run pulls until all bonds are broken; points are the runs, rings the exact formulas.
+# Every run pulls until all bonds are broken; coloured points are the runs, black dots the exact formulas.
 
 # %%
 rates = {"from": "0.01 pN/s", "to": "100 nN/s", "points": 57, "spacing": "logarithmic"}

@@ -384,7 +384,7 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
 
 def _draw_statistics(ax: Axes, dataset: xarray.Dataset, words: Mapping[str, str], size: float) -> None:
     """Draw results of each run over the swept parameter, by name with their labels in the legend, in one colour for
-    each or for each value of a second parameter; exact values as black rings, as they are known at these points only.
+    each or for each value of a second parameter; exact values as black dots, as they are known at these points only.
     """
     parameter = dataset[str(dataset["status"].dims[0])]
     style.draw_parameter(ax.xaxis, parameter)
@@ -399,20 +399,19 @@ def _draw_statistics(ax: Axes, dataset: xarray.Dataset, words: Mapping[str, str]
         ax.plot([], [], color=colour, label=label)
     for word, marker, colour in zip(words.values(), MARKERS, COLOURS, strict=False):
         ax.plot([], [], marker, color="black" if len(seconds) > 1 else colour, markersize=large, label=word)
-    _draw_rings(ax, dataset, [f"{name}_exact" for name in words if f"{name}_exact" in dataset], size, large + 2)
+    _draw_exact(ax, dataset, [f"{name}_exact" for name in words if f"{name}_exact" in dataset], size, large / 3)
 
 
-def _draw_rings(ax: Axes, dataset: xarray.Dataset, names: Sequence[str], size: float, width: float) -> None:
-    """Draw exact results of each run as black rings [pt]."""
+def _draw_exact(ax: Axes, dataset: xarray.Dataset, names: Sequence[str], size: float, width: float) -> None:
+    """Draw exact results of each run as black dots of a width [pt], on the points of the runs."""
     x = dataset[str(dataset["status"].dims[0])].values
     found = [values for name in names for values, _ in style.curves_by_second(dataset, final_values(dataset, name))]
     for j, values in enumerate(found):
-        look: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": width, "markeredgewidth": 0.6}
-        ax.plot(x, values / size, "o", label="_" if j else "exact", **look)
+        ax.plot(x, values / size, "o", color="black", markersize=width, label="_" if j else "exact")
 
 
 def lifetimes(dataset: xarray.Dataset) -> Figure:
-    """Draw the lifetime over the swept parameter, the exact one as rings, and the survival over time of some runs."""
+    """Draw the lifetime over the swept parameter, the exact one as dots, and the survival over time of some runs."""
     with style.panels(6.4, 5.3, 2) as (plot, grid):
         above, below = grid[:, 0]
         _draw_statistics(above, dataset, {"lifetime": "runs"}, 1.0)
