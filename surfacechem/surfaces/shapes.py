@@ -500,7 +500,7 @@ class Heights(Shape):
 
     def derivatives(self, u: Array, v: Array, count: int) -> Array:
         """Return points and derivatives of the spline."""
-        orders = [(i - j, j) for i in range(4) for j in range(i + 1)][:count]
+        orders = [(i - j, j) for i in range(3) for j in range(i + 1)][:count]
         found = np.zeros((len(orders), *np.shape(u), 3))
         found[0, ..., 0], found[0, ..., 1], found[1, ..., 0], found[2, ..., 1] = u, v, 1.0, 1.0
         for k, (i, j) in enumerate(orders):
