@@ -6,8 +6,8 @@ inside the last step come from the integrator's polynomial, whose derivatives it
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from functools import cache, cached_property, partial
 from typing import Any, NoReturn, Self
 
@@ -105,6 +105,12 @@ def _switch(name: str) -> property:
     return property(lambda self: self.switches[name][0], change)
 
 
+def hook(method: Any) -> Any:
+    """Keep the signature of a hook, for which Cantera asks in every reactor that is made."""
+    method.__signature__ = inspect.signature(method)
+    return method
+
+
 class StateVectorReactor(cantera.ExtensibleReactor):
     """A reactor whose state and rates are not Cantera's; the only place that depends on Cantera's hooks.
 
@@ -157,6 +163,7 @@ class StateVectorReactor(cantera.ExtensibleReactor):
 
     # -- Cantera 3.2's hooks ---------------------------------------------------------------------------------------
 
+    @hook
     def replace_initialize(self, _start: float) -> None:
         if self.surfaces:
             self.error = InputError(
@@ -165,22 +172,28 @@ class StateVectorReactor(cantera.ExtensibleReactor):
             raise self.error
         self.n_vars = len(self.names)
 
+    @hook
     def replace_get_state(self, y: Any) -> None:
         y[:] = self.start()
 
+    @hook
     def replace_update_state(self, y: Any) -> None:
         self.put(np.array(y))
 
+    @hook
     def replace_update_connected(self, _pressure: bool) -> None:
         """Do nothing: other reactors do not read the contents."""
 
+    @hook
     def replace_eval(self, t: float, _lhs: Any, rhs: Any) -> None:  # its left side is one
         self.asked = t
         np.asarray(rhs)[:] = self.attempt(self.rates, t)
 
+    @hook
     def replace_component_name(self, i: int) -> str:
         return self.names[i]
 
+    @hook
     def replace_component_index(self, name: str) -> int:
         if name not in self.names:  # the accounts of the ledger, in an artificial unit, are not offered
             known = [each for each in self.names if not each.endswith(f" / {LEDGER_UNIT:g}")]
@@ -198,37 +211,37 @@ class _SystemReactor(StateVectorReactor):
 
     def __init__(self, surface: Any, view: View, x: Array) -> None:
         super().__init__(surface)
-        self.view = view
-        self.evaluation = Evaluation(view.program, view.y, view.parameters)
+        self.view, evaluation = view, Evaluation(view.program, view.y, view.parameters)
         self.count = len(x)
         lines = view.program.n_ledger if view.program.external else 0
-        self.counts = lines > 0
         self.unit = np.concatenate((np.maximum(view.atol, TINY), np.full(lines, LEDGER_UNIT)))
         self.scaled = np.concatenate((x, np.zeros(lines))) / self.unit
         self.names = tuple(f"x{i}" for i in range(len(self.unit)))
+        self.reach, self.slopes = evaluation.reach, evaluation.rates if lines else evaluation.slopes
 
     def start(self) -> Array:
         return self.scaled
 
     # Cantera calls these more often than the steps that it takes, so they go no further than to the equations.
 
+    @hook
     def replace_update_state(self, y: Any) -> None:
         self.scaled = np.array(y)
 
+    @hook
     def replace_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
         if self.error is not None:
             raise self._failure(self.error)
         self.view.residuals += 1
-        evaluation, x = self.evaluation, self.scaled * self.unit
         try:
-            found = evaluation.reach(t, x[: self.count] if self.counts else x)
+            found = self.reach(t, (self.scaled * self.unit)[: self.count])
         except Exception as error:
             self.error = error
             raise self._failure(error) from None
         # Cantera itself rejects rates that are not finite, as it does this error.
         if not found:
             raise BackOffError("no consistent state")
-        np.divide(evaluation.rates() if self.counts else evaluation.slopes(), self.unit, out=np.asarray(rhs))
+        np.divide(self.slopes(), self.unit, out=np.asarray(rhs))
 
 
 def last_step(net: Any, start: float, end: float) -> DenseStep:
@@ -260,26 +273,31 @@ class _Stretch(Method):
 
     def several(self, most: int) -> Steps:
         reactor, step, derivative = self.reactor, self.net.step, self.net.get_derivative
-        times, ends = [self.t], np.zeros((most + 1, 3, len(reactor.unit)))
-        ends[0] = reactor.scaled if self.last is None else self.last
+        times, found = [self.t], [reactor.scaled] if self.last is None else [*self.last]
         while len(times) <= most and self.t < self.end and self.failure is None:
             # Cantera has no stop time, and a step beyond the end would miss what changes there.
             if self.end - self.t < self.longest:
                 self.net.max_time_step = max(self.end - self.t, FORMULA_EPS * self.end)
             try:
-                self.t, row = step(), ends[len(times)]
-                row[0], row[1] = reactor.scaled, derivative(1)
-                with suppress(cantera.CanteraError):  # the first polynomial is a straight line
-                    row[2] = derivative(2)
+                now = step()
+                if not now > self.t:  # Cantera would go on, across a pole, too
+                    raise StepError("the step size fell to zero")
+                self.t, slopes = now, derivative(1)
+                try:
+                    curvatures = derivative(2)
+                except cantera.CanteraError:  # the first polynomial is a straight line
+                    curvatures = np.zeros_like(slopes)
+                found += reactor.scaled, slopes, curvatures
                 times.append(self.t)
-            except (cantera.CanteraError, ArithmeticError) as error:
+            except (cantera.CanteraError, ArithmeticError, StepError) as error:
                 self.failure = error  # an event may lie before it
         if len(times) == 1:
             raise StepError(str(self.failure)) from self.failure
-        if self.last is None:
-            ends[0, 1:] = ends[1, 1:]  # the first polynomial is a straight line
-        self.last = ends[len(times) - 1]
-        rows = hermite(np.diff(times), ends[: len(times)] * reactor.unit)
+        if self.last is None:  # the first polynomial is a straight line
+            found[1:1] = found[2:4]
+        ends = np.concatenate(found).reshape(len(times), 3, -1)
+        self.last = ends[-1]
+        rows = hermite(np.diff(times), ends * reactor.unit)
         return Steps(np.array(times), partial(self._step, times, rows), at_nodes(rows[..., : reactor.count]))
 
     def _step(self, times: Sequence[float], rows: Array, k: int) -> DenseStep:

@@ -21,7 +21,7 @@ ENTROPY_GROUP = 1
 MAX_DEFECT = 100.0
 """Defect, in tolerances, above which a step has missed something before an event."""
 
-FIRST_TOGETHER, TOGETHER_GROWTH, MOST_TOGETHER = 8, 16, 256
+FIRST_TOGETHER, TOGETHER_GROWTH, MOST_TOGETHER = 16, 16, 256
 """Number of steps for which the equations are evaluated together: at first, its growth, and at most. Steps beyond an
 event are wasted; between 64 and 256 the maximum makes no difference to a run of a hundred reactions.
 """
