@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -98,7 +99,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
         if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
             raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")
     # Owners with the same name of their temperature share it: they are in perfect contact.
-    owners = [body.mapping().get("temperature") for body in bodies.values()]
+    owners = [body.mapping().get("temperature") for body in bodies.values()] or [None, None]
     temperatures = _temperature_names([*owners, interface.get("temperature")])
     whole = "surface" in top
     if whole:
@@ -365,11 +366,13 @@ def _stiffness(body: BodySection) -> float | None:
         for name in ("E", "H"):
             if body.has(name):
                 raise body.error("the stiffness has two roles: give `stiffness`, or `E` and `H`.", name, "stiffness")
-        return body.stiffness
     for name, other in (("E", "H"), ("H", "E")):
         if body.has(other) and not body.has(name):
             raise body.error(f"a body's stiffness is E / H; `{name}` is missing.", other)
-    return None if body.E is None or body.H is None else body.E / body.H
+    k = body.E / body.H if body.E is not None and body.H is not None else body.stiffness
+    if k is not None and not sys.float_info.min <= k <= 1 / sys.float_info.min:
+        raise body.error(f"a stiffness of {k:g} Pa/m is beyond the range of numbers.", "stiffness", "E")
+    return k
 
 
 def _stages(case: Document) -> tuple[Stage, ...]:

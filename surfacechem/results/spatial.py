@@ -251,7 +251,9 @@ def cell_errors(near: Mapping[str, float], far: Mapping[str, float], rtol: float
     in_noise = first <= rtol / RTOL_PART  # errors of runs are below this
     if in_noise:
         return CellErrors(near, in_noise=True)
-    factors = {name: min(max(far[name] / d, LEAST_ORDER), ORDER) if d else ORDER for name, d in near.items()}
+    # Events that one pair of runs alone disagrees on are infinitely wrong in that pair, and no error in the other.
+    known = {name: far.get(name, 0.0) / d if 0 < d < math.inf else ORDER for name, d in near.items()}
+    factors = {name: min(max(ratio, LEAST_ORDER), ORDER) for name, ratio in known.items()}
     errors = {name: d / (factors[name] - 1) for name, d in near.items()}
     return CellErrors(errors, converged=math.isfinite(second) and second >= LEAST_ORDER * first)
 

@@ -330,6 +330,9 @@ def test_an_error_that_does_not_converge_is_unknown():
     found = cell_errors({"T_1": 1e-4}, {"T_1": 5e-5}, rtol=1e-11)
     assert not found.converged
     assert np.isnan(found.largest)
+    one_pair_differs = cell_errors({"T_1": 1e-4, "event times": np.inf}, {"T_1": 4e-4}, rtol=1e-11)
+    assert not one_pair_differs.converged
+    assert np.isnan(one_pair_differs.largest)
     run = two(40).run()
     estimate = with_cells(against_tighter(run.trajectory), found)
     assert np.isnan(estimate.error)

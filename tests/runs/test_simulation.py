@@ -163,6 +163,7 @@ def test_a_case_is_a_path_a_text_a_mapping_or_an_open_file(tmp_path):
         (3, "a case is a path, a name, a text, a mapping or an open file, not int"),
         ({"bodies": object()}, "a case holds numbers, texts, lists and mappings, not object"),
         ("title: none\n", "case.yaml:1: the case needs `bodies`"),
+        ("interface: {temperature: T_c}\nrun: {until: 1}\n", "case.yaml:1: the case needs `bodies`"),
     ],
 )
 def test_what_is_no_case_is_refused(source, message):
