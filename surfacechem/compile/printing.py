@@ -216,7 +216,9 @@ def _function(system: System, printer: _Python, name: str, text: str, rows: Sequ
     lines += ["    parameters = parameters_at(t) if parameters is None else parameters"] if pieced else []
     for names, source in ((states, "y"), (rates, "ydot"), ([str(p.symbol) for p in system.parameters], "parameters")):
         if names:
-            lines += _unpacked([printer.name(n) for n in names], source)
+            own = ", ".join(map(printer.name, names)) + "," * (len(names) == 1)
+            bracketed = len(own) > CODE_WIDTH or len(names) == 1
+            lines += _broken_line("    (", own, f") = {source}") if bracketed else [f"    {own} = {source}"]
     for item in quantities_read(system.named, [row.expression for row in rows]):
         lines += _assignment(printer, item.name, item.expression, _described(item.quantity))
     for row in rows:
@@ -238,12 +240,6 @@ def _described(quantity: Quantity) -> str:
 def _safe(text: str) -> str:
     """Return text that ends neither a comment nor a docstring."""
     return " ".join(text.split()).replace("\\", "/").replace('"""', "'''")
-
-
-def _unpacked(names: Sequence[str], source: str) -> list[str]:
-    left = f"{names[0]}," if len(names) == 1 else ", ".join(names)
-    bracketed = len(left) > CODE_WIDTH or len(names) == 1
-    return _broken_line("    (", left, f") = {source}") if bracketed else [f"    {left} = {source}"]
 
 
 def _assignment(printer: _Python, name: str, expression: Expression, text: str) -> list[str]:

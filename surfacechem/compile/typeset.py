@@ -246,7 +246,9 @@ def _balance(system: System, name: str, row: Expression) -> Iterator[Statement]:
         if slope == 0 or state.dot in slope.free_symbols:
             return symengine.Integer(0), expression
         rest = expression.xreplace({state.dot: symengine.Integer(0)})
-        slope, rest = (-slope, rest) if _is_negative(slope) else (slope, -rest)
+        # Capacities and stiffnesses are positive, as evaluated at a state of open gaps.
+        at = {x: symengine.Integer(8) if str(x) in GAPS else HALF for x in slope.free_symbols}
+        slope, rest = (-slope, rest) if sympy_form(slope.xreplace(at)).n() < 0 else (slope, -rest)
         return _shortest(slope) * state.dot, _shortest(rest)
 
     yield from _grouped(system, Named(state.quantity, row), sides, state.quantity.long_name)
@@ -287,12 +289,6 @@ def _tabulated(expression: Expression) -> Expression:
     """Return the expression with a symbol for each table of numbers, such as an interpolation."""
     tables = [p for p in expression.atoms(symengine.Piecewise) if len(p.atoms(symengine.Float)) > TABLE_NUMBERS]
     return expression.xreplace({p: symengine.Symbol(TABLE_PREFIX + str(max(map(str, p.free_symbols)))) for p in tables})
-
-
-def _is_negative(expression: Expression) -> bool:
-    """True if a capacity or a stiffness has a negative sign, as evaluated at a state of open gaps."""
-    state = {x: symengine.Integer(8) if str(x) in GAPS else HALF for x in expression.free_symbols}
-    return bool(sympy_form(expression.xreplace(state)).n() < 0)
 
 
 def _shortest(expression: Expression) -> Expression:

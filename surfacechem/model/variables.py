@@ -136,16 +136,13 @@ class Variables:
             name = "p_contact"
         if name not in self._symbols:
             if name not in self._makers:
-                raise self._missing(name, reader, path)
+                who, place = (f"the law {reader.name()}", reader.place) if isinstance(reader, Law) else (reader, None)
+                remedy = REMEDIES.get(name, suggestion(name, self._makers).strip())
+                message = f"{who} reads {self._described(name)}, but nothing evolves or prescribes it. {remedy}"
+                raise InputError(message, place, path=path)
             made = self._makers[name]
             self._symbols[name] = made() if callable(made) else made
         return self._symbols[name]
-
-    def _missing(self, name: str, reader: str | Law, path: str) -> InputError:
-        who = f"the law {reader.name()}" if isinstance(reader, Law) else reader
-        remedy = REMEDIES.get(name, suggestion(name, self._makers).strip())
-        message = f"{who} reads {self._described(name)}, but nothing evolves or prescribes it. {remedy}"
-        return InputError(message, reader.place if isinstance(reader, Law) else None, path=path)
 
     def _described(self, name: str) -> str:
         words = VARIABLES[name].long_name.partition(":")[0] if name in VARIABLES else "variable"
@@ -175,7 +172,9 @@ class Variables:
         law = law.with_parts(self.shared)
         values: dict[str, Expression] = {}
         for name, spec in law.specs():
-            values[name] = self._parameter(law, name, law.refine(name, spec).resolved(unit), suffix)
+            values[name] = self._symbol(law, name, law.refine(name, spec).resolved(unit), suffix)
+            if spec.stretch and values[name] is not None and self.has("J_c"):
+                values[name] *= self.get("J_c", law) ** spec.stretch
         if isinstance(law, Load):
             for name, local_unit in law.local.items():
                 spec = Spec(resolved_unit(local_unit, unit), f"{name} of the present piece")
@@ -187,13 +186,6 @@ class Variables:
         if law not in self._bound:
             self._bound[law] = self.bind(law, path, suffix) if isinstance(law, Law) else law.bound(self.shared)
         return self._bound[law]
-
-    def _parameter(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
-        """Return the symbol of a parameter for its formula, scaled by the area stretch if the parameter requires it."""
-        symbol = self._symbol(law, name, spec, suffix)
-        if spec.stretch and symbol is not None and self.has("J_c"):
-            return symbol * self.get("J_c", law) ** spec.stretch
-        return symbol
 
     def _symbol(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
         value = getattr(law, name)

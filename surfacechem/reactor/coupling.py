@@ -260,18 +260,19 @@ def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
 def function_of(scene: Scene, name: str, load: Callable[[float], float] | float | str) -> Callable[[float], float]:
     """Return a load as a function of time; InputError unless it is a function, a number or a text with a unit."""
     if callable(load):
-        return lambda t: _number_of(name, t, load(t))
+
+        def checked(t: float) -> float:
+            value: Any = load(t)
+            try:
+                return float(value)
+            except (TypeError, ValueError):
+                words = f"a number in SI at each time; at t = {t:g} s it is {value!r}"
+                raise InputError(f"the load {name} is {words}.") from None
+
+        return checked
     unit = load_units(scene).get(name)
     level = parse(load, unit, name=name) if unit else 0.0  # reported later
     return lambda _: level
-
-
-def _number_of(name: str, t: float, value: Any) -> float:
-    """Return what a load of the script is at a time [s]; InputError unless it is a number."""
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"the load {name} is a number in SI at each time; at t = {t:g} s it is {value!r}.") from None
 
 
 def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:

@@ -115,8 +115,11 @@ class InterfaceReactor(StateVectorReactor):
         """Whether variables were set since other reactors asked for rates, and the time of that request [s]."""
         self.evaluations, self.seconds = 0, 0.0
         self._set_scene(self.scene)
+        self._connecting = True
         for body, reactor in self.bodies.items():
-            self._connect(reactor, body)
+            # Through the wall the reactor supplies the heat that keeps the body at its temperature.
+            self._walls.append(HeatWall(self, reactor, interface=self, A=self.area, Q=partial(self._supplied, body)))
+        self._connecting = False
         for k, neighbour in enumerate(self.neighbours.values()):
             if isinstance(neighbour, Receiver):
                 neighbour.sources.append((self, partial(self._given, k)))
@@ -158,12 +161,9 @@ class InterfaceReactor(StateVectorReactor):
         """Indices of the variables that hold the heat of the bodies that reactors replace."""
         self.history = History(scene)
 
-    def _connect(self, reactor: Any, body: str) -> None:
-        """Connect a reactor by a wall through which it supplies the heat that keeps the body at its temperature."""
-        self._connecting = True
-        heat = lambda t: -float(self._rates_for_others(t)[self._accounts[body]])  # noqa: E731
-        self._walls.append(HeatWall(self, reactor, interface=self, A=self.area, Q=heat))
-        self._connecting = False
+    def _supplied(self, body: str, t: float) -> float:
+        """Return the heat [W/m^2] that the reactor in place of a body supplies at a time [s]."""
+        return -float(self._rates_for_others(t)[self._accounts[body]])
 
     def _given(self, k: int, t: float) -> tuple[Array, float]:
         """Return species [kmol/s] and enthalpy [W] that reactions give to a neighbour at a time [s]."""
@@ -359,7 +359,9 @@ class InterfaceReactor(StateVectorReactor):
         if asked == self._last_inputs and self._last is not None:
             self._current = True
             return self._last[2]
-        if self._stands_still(t) and self._last is not None:
+        # Steps as short as the rounding of the time, other than after a start, lead nowhere.
+        since = t - self.restarted
+        if self._last is not None and 0 < t - self._last[0] <= 2 * FEW_EPS * abs(t) and since > RUN_EPS * abs(t):
             raise self._stopped(f"{self.scene.closest(self._last[0], self._last[1])} near t = {t:.9g} s")
         try:
             rates = self.scene.rates(t, self.x)
@@ -402,11 +404,6 @@ class InterfaceReactor(StateVectorReactor):
         """Return the end of the scene, which is also stored, since Cantera loses exceptions."""
         self.reason, self.error = reason, InterfaceStopped(reason)
         return self.error
-
-    def _stands_still(self, t: float) -> bool:
-        """True if steps are as short as the rounding of the time, other than after a start."""
-        step = t - self._last[0] if self._last is not None else 0.0
-        return 0 < step <= 2 * FEW_EPS * abs(t) and t - self.restarted > RUN_EPS * abs(t)
 
     def inputs_at(self, t: float) -> object:
         """Return everything that the rates at a time [s] depend on besides the variables."""

@@ -309,13 +309,15 @@ def state_differences(
             for run, own in zip((ours, theirs), rows, strict=True)
         )
         for name in points[0].keys() & points[1].keys():
-            values[name], true[name] = _at_same_places(values[name], true[name], points[0][name], points[1][name])
+            few = min(points, key=lambda each: len(each[name]))[name]  # of two grids the one with fewer points
+            values[name], true[name] = (
+                each[name] if own[name] == few else _cubic(own[name], each[name], few)
+                for each, own in zip((values, true), points, strict=True)
+            )
         known = sizes(theirs, named=values.keys() - states(theirs).keys())
         known = {name: size[rows[1][alike]] for name, size in known.items()}
         errors = largest_errors(values, {name: true[name] for name in true if name in values}, known)
-    if found:
-        errors |= event_errors(found, expected, ours.run.times[-1])
-    return errors, note
+    return errors | event_errors(found, expected, ours.run.times[-1]), note
 
 
 def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
@@ -366,13 +368,6 @@ def _compared(trajectory: Trajectory, also: Collection[str]) -> dict[str, Array]
     """Return the states at the output times, and some named quantities; without states the exchanged amounts."""
     own = states(trajectory) or exchanged(trajectory)
     return own | {name: each for name, each in computed(trajectory).items() if name in also} if also else own
-
-
-def _at_same_places(a: Array, b: Array, x_a: Sequence[float], x_b: Sequence[float]) -> tuple[Array, Array]:
-    """Return two profiles at the points of the one that has fewer."""
-    if x_a == x_b:
-        return a, b
-    return (_cubic(x_a, a, x_b), b) if len(x_a) > len(x_b) else (a, _cubic(x_b, b, x_a))
 
 
 def _cubic(places: Sequence[float], rows: Array, wanted: Sequence[float]) -> Array:

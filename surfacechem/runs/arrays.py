@@ -124,13 +124,6 @@ def _starts_as_given(system: System, swept: set[str]) -> bool:
     return not (searched or made or registers)
 
 
-def _takes_implicit_lanes(model: Model, run: Run, automatic: bool) -> bool:
-    """True if only stiffness asks for implicit steps, of all runs or of those that turn stiff; the other reasons for
-    them ask for single runs.
-    """
-    return automatic and run.rtol > MIN_RTOL and not model.system.has_moving_gap
-
-
 class ArrayRuns:
     """Runs of a plan that can be solved as arrays, see :func:`is_array`."""
 
@@ -145,7 +138,9 @@ class ArrayRuns:
         """
         self.model, self.plan, self.run, self.keep = model, plan, run, keep
         self.values = model.values(changes)
-        stiff = _takes_implicit_lanes(model, run, automatic)
+        # Implicit steps in lanes are for stiffness, of all runs or of those that turn stiff; the other reasons for
+        # implicit steps ask for single runs.
+        stiff = automatic and run.rtol > MIN_RTOL and not model.system.has_moving_gap
         self.problem = replace(self._first_problem(changes), explicit=run.solver == EXPLICIT, implicit_lanes=stiff)
         system = model.system
         self.n = len(system.states)

@@ -469,20 +469,16 @@ class SweepSolution(Results):
         columns += event_columns(self.runs, shape)
         columns += self._single() if load is None else []
         for which in self.statistic_names:
-            name, unit, text = self._statistic(which)
+            name, unit, text = which, "s", "mean lifetime"
+            if self.plan.load:
+                q = quantities(self.system)[self.plan.load]
+                name, unit, text = f"{q.name}_{which}", q.unit, f"{STATISTICS[which]} {q.long_name} at rupture"
             found = [getattr(statistics, which) for statistics in self.statistics]
             columns.append(self._of_each(name, found, unit, text))
             if self.accuracy and which in self.accuracy.exact:
                 exact = self.accuracy.exact[which]
                 columns.append(self._of_each(f"{name}_exact", exact, unit, f"exact {text}"))
         return (*columns, *([self._lifetime(columns)] if self.statistic_names and self.plan.load else []))
-
-    def _statistic(self, which: str) -> tuple[str, str, str]:
-        """Return name, unit and meaning of a statistic in the dataset."""
-        if not self.plan.load:
-            return which, "s", "mean lifetime"
-        load = quantities(self.system)[self.plan.load]
-        return f"{self.plan.load}_{which}", load.unit, f"{STATISTICS[which]} {load.long_name} at rupture"
 
     def _single(self) -> Iterator[Column]:
         """Yield the last, largest and smallest values of each run, which may lie between the shared output times."""

@@ -204,12 +204,6 @@ def _coldest(w: Any) -> float:
 
 
 @compiled
-def _is_admissible(w: Any, gain: float, small: float, heat: float) -> bool:
-    """True if entropy production is not negative, up to ``small`` and an uncertainty ``heat`` of the heat."""
-    return bool(gain >= -small - heat / _coldest(w))
-
-
-@compiled
 def _add_to_ledger(w: Any, released: float, gain: float, heat: float, entropy: float) -> None:
     """Add the amounts of the jump to the accounts of the ledger."""
     for m in range(w.n_ledger):
@@ -283,7 +277,8 @@ def jump(w: Any, i: int, e: int) -> bool:
     _evaluate_totals(w, w.perturbed, varied)
     gain = now[1] - before[1] + entropy
     small = RUN_EPS * max(abs(before[1]), abs(now[1]), abs(entropy)) + FEW_EPS * before[-1] + abs(varied[1] - before[1])
-    admissible = _is_admissible(w, gain, small, abs(varied[0] - before[0]))
+    # Entropy production is not negative, up to roundoff and the uncertainty of the heat.
+    admissible = gain >= -small - abs(varied[0] - before[0]) / _coldest(w)
     if not finite(w.after) or (w.edges[e, REFUSES] == 1 and not admissible):
         return False
     _write_event(w, i, e)

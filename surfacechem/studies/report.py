@@ -113,7 +113,7 @@ def mathml(latex: str, *, display: bool = False) -> str:
 
 
 def typeset_equation(line: Equation) -> str:
-    """Convert an typeset_equation with line breaks between terms; a term wider than the page is drawn smaller."""
+    """Convert an equation with line breaks between terms; a term wider than the page is drawn smaller."""
     first = mathml(f"{line.left} {line.pieces[0]}", display=True)
     # A sign at the beginning of a line is spaced like one between two terms.
     rest = [mathml(piece, display=True).replace("<mo>", '<mo form="infix">', 1) for piece in line.pieces[1:]]
@@ -121,8 +121,8 @@ def typeset_equation(line: Equation) -> str:
 
 
 def font_face() -> str:
-    """Return the font_face of formulas as a data address, so that a page needs no other file."""
-    return f"data:font_face/woff2;base64,{b64encode(FONT.read_bytes()).decode()}"
+    """Return the font of formulas as a data address, so that a page needs no other file."""
+    return f"data:font/woff2;base64,{b64encode(FONT.read_bytes()).decode()}"
 
 
 def _fitted(formula: str) -> str:

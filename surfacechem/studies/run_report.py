@@ -33,7 +33,6 @@ from surfacechem.runs.listing import FORMULA, Sheet, plain, source
 from surfacechem.runs.simulation import Simulation
 from surfacechem.runs.summaries import REGIMES, duration, points_summary, run_summary, surface_rows, sweep_summary
 from surfacechem.runs.sweeps import SweepSolution
-from surfacechem.scene import Scene
 from surfacechem.solve.run import values_of
 from surfacechem.studies.report import Page, PageSection, PageTable, Typeset
 
@@ -142,17 +141,13 @@ def _values(attributes: Mapping[str, Any]) -> dict[str, float]:
     return {path: value for path, (value, _) in changes_of(attributes).items()}
 
 
-def _as_run(case: cases.Case, changes: Mapping[str, float]) -> Scene:
-    """Return the scene of a case with the changes of a run that can be overrides of a case."""
-    for path, value in changes.items():
-        with suppress(InputError):
-            case = cases.load_text(case.text, mechanism_text=case.mechanism_text, overrides={path: value})
-    return case.scene
-
-
 def _scene(case: cases.Case, attributes: Mapping[str, Any]) -> Iterator[PageSection]:
     """Yield sections on the scene of a run: words, drawing, and equations."""
-    system, scene = case.system(), _as_run(case, _values(attributes))
+    system, changed = case.system(), case
+    for path, value in _values(attributes).items():
+        with suppress(InputError):  # not every change of a run can be an override of a case
+            changed = cases.load_text(changed.text, mechanism_text=case.mechanism_text, overrides={path: value})
+    scene = changed.scene
     regime = f"{system.regime}: {REGIMES.get(system.regime, '')}"
     rows = [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]
     words = [text for text in (case.description, case.source and f"Source: {case.source}", regime) if text]

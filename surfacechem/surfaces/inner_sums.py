@@ -155,7 +155,10 @@ def tensor_grid(surface: Surface, x: Array, found: Projection, reach: Array, lev
     for k, tangent in enumerate((x_u, x_v)):
         at, size = found.at[:, k], np.maximum(np.linalg.norm(tangent, axis=-1), POLE)
         ends = (at - math.pi, at + math.pi) if surface.shape.closed[k] else (low[k], high[k])
-        scale, far = found.gap / size, _parameter_bound(surface, k, size, reach + found.gap)
+        scale, far = found.gap / size, reach + found.gap
+        if surface.shape.closed[k] or isinstance(surface.shape, Sphere):
+            # An angle may differ by up to pi times distance over tangent; other parameters are lengths.
+            far = math.pi * far / size
         below, above = np.minimum(at - ends[0], far), np.minimum(ends[1] - at, far)
         grain = surface.shape.grain / size / scale
         edges = piece_edges(-np.arcsinh(below / scale), np.arcsinh(above / scale), grain, level)
@@ -165,15 +168,6 @@ def tensor_grid(surface: Surface, x: Array, found: Projection, reach: Array, lev
     u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
     points, areas = surface.elements(np.stack([u, v], axis=-1).reshape(len(x), -1, 2))
     return Grid(x, None, points, areas * (du[:, :, None] * dv[:, None, :]).reshape(len(x), -1))
-
-
-def _parameter_bound(surface: Surface, k: int, tangent: Array, distance: Array) -> Array:
-    """Return a bound on the parameter difference from a foot, along a direction with tangents of this length (n,), for
-    points within a distance (n,) of the foot.
-    """
-    shape = surface.shape
-    # An angle may differ by up to pi times distance over tangent; other parameters are lengths.
-    return math.pi * distance / tangent if shape.closed[k] or isinstance(shape, Sphere) else distance
 
 
 def alike_around(outer: Surface, inner: Surface) -> bool:

@@ -103,15 +103,11 @@ def _coefficients_of(polynomials: list[Polynomial], count: int) -> NDArray[np.fl
     return table[1:]
 
 
-def _from_end() -> NDArray[np.float64]:
-    """Return the coefficients of s, s^2, ... in the extrapolated change after the end of a step, by its stage rates."""
-    end = Polynomial([1.0, 1.0])
-    return _coefficients_of([each(end) for each in _polynomials()[1 : 1 + STAGES]], STAGES)
-
-
 _quarters = weighted_sums(np.array([[each(x) for each in _polynomials()] for x in (0.25, 0.5, 0.75)]), LANES)
 _polynomial = weighted_sums(_coefficients_of(_polynomials(), ORDER), LANES)
-_extrapolated = weighted_sums(_from_end(), LANES)
+# The extrapolated change after the end of a step, by its stage rates.
+_after_end = [each(Polynomial([1.0, 1.0])) for each in _polynomials()[1 : 1 + STAGES]]
+_extrapolated = weighted_sums(_coefficients_of(_after_end, STAGES), LANES)
 _to_slopes = weighted_sums(INVERSE[MEMBER, :STAGES, :STAGES], LANES)
 _to_parts = weighted_sums(TO_PARTS[MEMBER, :STAGES, :STAGES], LANES)
 _from_parts = weighted_sums(FROM_PARTS[MEMBER, :STAGES, :STAGES], LANES)

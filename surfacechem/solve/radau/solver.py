@@ -99,14 +99,6 @@ def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[N
     return sizes, code, *others, edges.words
 
 
-def _edge_rows(problem: Problem, count: int, arcs: int, jumps: int) -> tuple[Array, Array]:
-    """Return memory for these numbers of arcs and jumps of each run."""
-    if problem.edges is NO_EDGES:
-        return _no_rows(count), _no_rows(count)
-    inputs, parameters = problem.program.n_inputs, problem.program.n_parameters
-    return np.empty((count, arcs, 5 + parameters)), np.empty((count, jumps, 3 + problem.edges.sizes[0] + 2 * inputs))
-
-
 def _usual_room(problem: Problem, steps: int, events: int) -> Room:
     return steps * problem.record_steps, events * bool(problem.margins), INSIDE_ROWS * bool(problem.line_error), events
 
@@ -122,7 +114,11 @@ def batch_of(
     program, times = problem.program, runs[-1]
     explicit = tables is None and problem.explicit and program.rates is not None
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
+    arcs = jumps = _no_rows(count)
     step_rows, event_rows, rows, jump_rows = room or _usual_room(problem, STEP_ROWS, EVENT_ROWS)
+    if problem.edges is not NO_EDGES:
+        arcs = np.empty((count, event_rows + len(problem.parameters), 5 + program.n_parameters))
+        jumps = np.empty((count, jump_rows, 3 + problem.edges.sizes[0] + 2 * program.n_inputs))
     return Batch(
         *_with_edges(tables or (program.explicit_tables if explicit else program.tables), problem.edges),
         problem.rtol,
@@ -140,7 +136,8 @@ def batch_of(
         np.empty((count, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(count),
         np.empty((count, rows, n + q)) if problem.line_error else _no_rows(count),
         np.empty((count, rows)),
-        *_edge_rows(problem, count, event_rows + len(problem.parameters), jump_rows),
+        arcs,
+        jumps,
     )
 
 
