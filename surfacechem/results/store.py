@@ -14,7 +14,7 @@ import os
 import secrets
 import shutil
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -121,8 +121,14 @@ class Layout:
 
     def index(self, number: int) -> NDArray[np.int64]:
         """Return the numbers of the runs of a chunk, in its order."""
-        ranges = [np.arange(part.start, part.stop) for part in self.region(number)]
-        return np.ravel_multi_index(np.meshgrid(*ranges, indexing="ij"), self.shape).ravel()
+        found = np.zeros(1, np.int64)
+        for part, size in zip(self.region(number), self.shape, strict=True):
+            found = (found[:, None] * size + np.arange(part.start, part.stop)).ravel()
+        return found
+
+    def runs_of(self, numbers: Iterable[int]) -> int:
+        """Return the number of runs of these chunks."""
+        return sum(math.prod(part.stop - part.start for part in self.region(number)) for number in numbers)
 
 
 @dataclass

@@ -306,7 +306,10 @@ class ArrayRuns:
         first = len(model.margins)
         scales = velocity_scales(model.system)
         y = rows[:, 1 : 1 + self.n]
-        sizes = jumper.magnitudes(np.concatenate([rows, np.maximum(scales, np.abs(y))], axis=1))
+        given = np.empty((count, rows.shape[1] + self.n))
+        given[:, : -self.n] = rows
+        np.maximum(scales, np.abs(y), out=given[:, -self.n :])
+        sizes = jumper.magnitudes(given)
         sizes = sizes if np.isfinite(sizes.sum()) else np.nan_to_num(sizes)
         seen = rows
         if jumper.guards_read_rates:
@@ -314,7 +317,9 @@ class ArrayRuns:
             seen = np.concatenate([rows[:, :1], point.y, point.ydot, rows[:, 1 + 2 * self.n :]], axis=1)
         now = program.margins(seen)
         active = first + np.flatnonzero(model.system.active_guards(self.problem.parameters[0])[first:])
-        none_due = all_above(now - GUARD_EPS * sizes, 0.0, active)
+        none_due = np.ones(count, dtype=bool)
+        for j in active:
+            none_due &= now[:, j] > GUARD_EPS * sizes[:, j]
         sizes[:, self.impacts] = np.maximum(sizes[:, self.impacts], MICROMETRE)
         exchanged = np.zeros((count, program.n_ledger))
         return np.concatenate([exchanged, sizes], axis=1) if program.n_ledger else sizes, none_due

@@ -236,9 +236,7 @@ class Stream:
         with self.store.locked(f"{self.part[0]}-of-{self.part[1]}"):
             numbers = list(self.numbers)
             missing = [number for number in numbers if not self.store.done(number)]
-            runs, resumed = (
-                sum(len(layout.index(number)) for number in some) for some in (numbers, set(numbers) - set(missing))
-            )
+            runs, resumed = layout.runs_of(numbers), layout.runs_of(set(numbers) - set(missing))
             done, failed = resumed, 0
             on_progress(Progress(runs, done, failed, resumed))
             for number, columns in self._computed(missing, threads or processors(), client):
