@@ -93,17 +93,11 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     top = tree.mapping(outer, elsewhere=dict.fromkeys(inner, "under `interface`"))
     bodies = top.get("bodies", nothing).mapping()
     interface = top.get("interface", nothing).mapping(inner, elsewhere=dict.fromkeys(outer, "at the top level"))
-    if "bodies" in top and len(bodies) != 2:
-        raise top["bodies"].error(f"exactly two bodies are needed, not {len(bodies)}; the first is body 1.")
-    for name, body in bodies.items():
-        if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
-            raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")
+    _refuse(top, bodies, interface)
     # Owners with the same name of their temperature share it: they are in perfect contact.
     owners = [body.mapping().get("temperature") for body in bodies.values()] or [None, None]
     temperatures = _temperature_names([*owners, interface.get("temperature")])
     whole = "surface" in top
-    if whole:
-        _refuse_bonds(interface)
     units = {name: TOTAL_UNITS.get(unit, unit) for name, unit in UNITS.items()} if whole else UNITS
     names = {**units, **dict.fromkeys(temperatures, "K")}
     context = Context(names, temperatures, tuple(bodies) or DEFAULT_BODIES, whole=whole)
@@ -119,10 +113,15 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     return read(Document, tree, context), mechanism
 
 
-def _refuse_bonds(interface: Mapping[str, Tree]) -> None:
-    """Raise InputError if an interface of curved bodies has bonds or friction of flat ones."""
+def _refuse(top: Mapping[str, Tree], bodies: Mapping[str, Tree], interface: Mapping[str, Tree]) -> None:
+    """Raise InputError if bodies are not two, or cannot have their names, or curved ones bond or rub as flats do."""
+    if "bodies" in top and len(bodies) != 2:
+        raise top["bodies"].error(f"exactly two bodies are needed, not {len(bodies)}; the first is body 1.")
+    for name, body in bodies.items():
+        if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
+            raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")
     # Before numbers are read, which would be expected in the units of a pair of bodies.
-    for name in KEYS_OF_FLATS:
+    for name in KEYS_OF_FLATS if "surface" in top else ():
         if name in interface:
             text = "is of flats. Over curved surfaces bonds may be in equilibrium with the gap: put the law"
             raise interface[name].error(f"`{name}` {text} equilibrium-bonds under `surface: {{laws: ...}}`.")
