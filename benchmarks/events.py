@@ -7,6 +7,7 @@ carries them out itself; the libraries are restarted by hand.
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -20,6 +21,7 @@ from surfacechem.compile.program import Program, compile_function, compile_progr
 from surfacechem.expressions import magnitude
 from surfacechem.solve import solver
 from surfacechem.solve.contract import EdgeTables, Guard, Problem, Status
+from surfacechem.solve.lanes.lane_batch import solve_batch
 from surfacechem.solve.radau.stepper import END
 
 RUPTURE = np.array([0.2, 1.0, 4000.0, 1e-9])
@@ -242,5 +244,6 @@ def rupture_batch(rtol: float, runs: int, threads: int) -> np.ndarray:
     """Times of rupture of randomised clusters, NaN where none was found."""
     parameters = RUPTURE * np.random.default_rng(0).uniform(0.85, 1.15, (runs, 1, 4))
     y0 = np.tile(RUPTURE_START, (runs, 1))
-    ends, counts, _ = solved_as_arrays(rupture_problem(rtol), y0, parameters, threads)
+    shared = replace(rupture_problem(rtol), implicit_lanes=True)
+    ends, counts, _ = solved_as_arrays(shared, y0, parameters, threads, solve_batch)
     return np.where(counts[:, END] == Status.EVENT, ends[:, 0], np.nan)

@@ -47,13 +47,13 @@ def problem(
     )
 
 
-def solved_as_arrays(shared: Problem, y0, parameters, threads: int = 1):
+def solved_as_arrays(shared: Problem, y0, parameters, threads: int = 1, solve=solve_arrays):
     """Ends, counts and outputs of runs that share all with a problem but y0 and parameters, on so many threads."""
     peaks = np.zeros((1, shared.program.n_ledger + shared.program.n_margins))
     alike = np.array([shared.spacing]), peaks, shared.segments[None], shared.times[None]
 
     def part(rows):
-        batch = solve_arrays(shared, y0[rows], parameters[rows], *alike)
+        batch = solve(shared, y0[rows], parameters[rows], *alike)
         return batch.ends, batch.counts, batch.outputs
 
     with ThreadPoolExecutor(threads) as pool:

@@ -109,7 +109,19 @@ class Lanes:
     states: "LaneFunction | None" = None
     """For implicit steps: rates of the states alone."""
     slopes: "LaneFunction | None" = None
-    """For implicit steps: derivatives of these rates by the states, row-major."""
+    """For implicit steps: derivatives of these rates by the states, row-major, and last by time."""
+    nonzeros: frozenset[int] = frozenset()
+    """Positions of those that may be nonzero."""
+
+    @cached_property
+    def step(self) -> "LaneFunction":
+        """The code of a linearly implicit step, compiled on first use by one thread only."""
+        from surfacechem.compile.rosenbrock import compile_step
+
+        assert self.states is not None
+        assert self.slopes is not None
+        with _ONE_THREAD:
+            return vars(self).get("step") or compile_step(self.states, self.slopes, self.nonzeros)
 
 
 @dataclass(frozen=True)
@@ -226,14 +238,15 @@ class Program:
         with _ONE_THREAD:
             return vars(self).get("implicit_lanes") or self.laned(True)
 
-    def lane_tables(self, lanes: Lanes) -> tuple[NDArray[Any], ...]:
+    def lane_tables(self, lanes: Lanes, linearly: bool) -> tuple[NDArray[Any], ...]:
         """Return the tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs
-        with constants, integrated columns); otherwise as the other tables, with a row for the constants, and with the
-        divisors for explicit steps alone.
+        with constants, integrated columns); otherwise as the other tables, with rows for the constants and for steps
+        that are ``linearly`` implicit, and with the divisors for explicit steps alone.
         """
         n_inputs = self.n_inputs + lanes.constants.n_out
         sizes = self.n, self.n_ledger, self.n_margins, n_inputs, self.n + self.n_ledger
-        functions = lanes.states, lanes.slopes, None, lanes.margins, lanes.rates, lanes.constants
+        step = lanes.step if linearly else None
+        functions = lanes.states, lanes.slopes, None, lanes.margins, lanes.rates, lanes.constants, step
         code = [(f.address if f else 0, 0) for f in functions]
         own, divisors = (np.array(sizes, np.int64), np.array(code, np.int64)), () if lanes.states else self.divisors
         return *own, *self.tables[2:-1], np.array(divisors, np.bool_)
@@ -677,8 +690,7 @@ def _compiled_lanes(
     known = list(zip(derivatives, rates, strict=True))
     others = [expanded(named, rows) for rows in others]
     ledger, margins = (expanded(known, rows) for rows in others)
-    states, zero = inputs[1 : 1 + len(rates)], symengine.Integer(0)
-    slopes = [row.get(x, zero) for row in jacobian(rates, states)[0] for x in states] if implicit else []
+    slopes = _lane_slopes(rates, inputs) if implicit else []
     constants, formed = constants_apart([*rates, *ledger, *margins, *slopes], inputs[1 + 2 * len(rates) :])
     columns, end, given = len(rates) + len(ledger), len(formed) - len(slopes), [*inputs, *constants]
     parts = {"rates": formed[:columns], "margins": formed[columns:end]}
@@ -686,10 +698,17 @@ def _compiled_lanes(
     try:
         return Lanes(
             constants=compile_lanes(inputs, list(constants.values())),
+            nonzeros=frozenset(place for place, slope in enumerate(slopes) if slope != 0),
             **{name: compile_lanes(given, part) for name, part in parts.items()},
         )
     except NotImplementedError:  # a function without vector code
         return None
+
+
+def _lane_slopes(rates: Sequence[Any], inputs: Sequence[Any]) -> list[Any]:
+    """Return the derivatives of rates by states, row-major, and last by time."""
+    rows, zero = jacobian(rates, inputs[: 1 + len(rates)])[0], symengine.Integer(0)
+    return [row.get(x, zero) for some in (inputs[1 : 1 + len(rates)], inputs[:1]) for row in rows for x in some]
 
 
 def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | None:

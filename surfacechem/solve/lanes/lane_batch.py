@@ -10,10 +10,11 @@ import numpy as np
 
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.contract import Array, Problem, Status
-from surfacechem.solve.lanes.layout import EXPLICIT_MEMORY, RADAU_MEMORY, SIZES
+from surfacechem.solve.lanes.layout import EXPLICIT_MEMORY, RADAU_MEMORY, ROSENBROCK_MEMORY, SIZES
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import Room, batch_of, solve_arrays
 from surfacechem.solve.radau.stepper import END
+from surfacechem.tolerances import LINEAR_RTOL
 
 
 def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> Any:
@@ -40,7 +41,7 @@ def _solved(problem: Problem, method: "LaneMethod | None", columns: Sequence[Arr
     assert lanes is not None
     y0, parameters, spacing, *others = map(np.ascontiguousarray, columns)
     runs = y0, parameters, spacing, np.array((problem.max_steps,)), *others
-    batch = batch_of(problem, runs, room, problem.program.lane_tables(lanes))
+    batch = batch_of(problem, runs, room, problem.program.lane_tables(lanes, method is ROSENBROCK))
     run(batch, method)
     return batch
 
@@ -70,14 +71,25 @@ class LaneMethod:
     memory: Mapping[str, Any]
 
 
+CODE = "vectors.py", "rosenbrock.py", "rosenbrock.json"
+"""Files of the room that compiles a program on which the loops depend."""
+
+
 def _method(words: str, memory: Mapping[str, Any], module: str, function: str, *parts: str) -> LaneMethod:
     here = Path(__file__).parent
     own = [here / f"{name}.py" for name in ("vector", "layout", "lane_step", "lane_guards", "lane_run", module, *parts)]
-    sources = [*stepper.sources(), here.parent.parent / "compile" / "vectors.py", *own]
+    sources = [*stepper.sources(), *(here.parent.parent / "compile" / name for name in CODE), *own]
     return LaneMethod(words, stepper.Loop(sources, f"{__package__}.{module}", function, brief=True), memory)
 
 
 EXPLICIT = _method("by explicit steps of order 8", EXPLICIT_MEMORY, "explicit_lanes", "run_explicitly")
+ROSENBROCK = _method(
+    "by linearly implicit steps of order 5",
+    ROSENBROCK_MEMORY,
+    "rosenbrock_lanes",
+    "run_linearly",
+    *("radau_lanes", "lane_linear"),
+)
 RADAU = _method("by Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "lane_linear")
 
 
@@ -86,4 +98,6 @@ def methods_of(problem: Problem) -> Iterator[LaneMethod]:
     if problem.explicit and problem.program.lanes:
         yield EXPLICIT
     if problem.implicit_lanes and problem.program.implicit_lanes:
+        if problem.rtol >= LINEAR_RTOL and not problem.program.n_ledger:
+            yield ROSENBROCK
         yield RADAU

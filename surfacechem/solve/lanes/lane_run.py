@@ -56,11 +56,10 @@ def _write_state(w: Any, row: Any, lane: int) -> None:
 
 @compiled
 def _record(w: Any, lane: int) -> None:
-    i = w.run[lane]
-    counts, records = w.counts[i], w.records[i]
-    if counts[RECORDS] < records.shape[0]:
-        _write_state(w, records[counts[RECORDS]], lane)
-    counts[RECORDS] += 1
+    """Record the start of a run or the end of a step."""
+    row, records = int(w.steps[lane]), w.records[w.run[lane]]
+    if row < records.shape[0]:
+        _write_state(w, records[row], lane)
 
 
 @compiled
@@ -68,9 +67,9 @@ def _end(w: Any, lane: int, status: int) -> None:
     """End a run and free its lane. Its guards are evaluated later, together with those of other runs that end."""
     i = w.run[lane]
     counts = w.counts[i]
-    counts[END] = status
+    counts[END], counts[RECORDS] = status, 1 + int(w.steps[lane])
     _write_state(w, w.ends[i], lane)
-    counters = w.steps[lane], w.rejected[lane], int(w.evaluations[lane])
+    counters = int(w.steps[lane]), int(w.rejected[lane]), int(w.evaluations[lane])
     for k, counter in enumerate(counters):
         counts[FIRST_COUNTER + k] = counter
     w.over[lane] = i
@@ -79,7 +78,7 @@ def _end(w: Any, lane: int, status: int) -> None:
 
 @compiled
 def _leave(w: Any, lane: int) -> None:
-    w.run[lane], w.next_output[lane] = -1, np.inf
+    w.run[lane], w.next_output[lane], w.busy[lane] = -1, np.inf, 0.0
 
 
 @compiled
@@ -104,8 +103,8 @@ def _enter(w: Any, lane: int) -> None:
 @compiled
 def _begin(w: Any, lane: int, i: int) -> None:
     """Begin run i in a lane."""
-    w.run[lane] = i
-    w.segment[lane] = w.steps[lane] = w.rejected[lane] = w.failed[lane] = w.stiff_steps[lane] = w.landing[lane] = 0
+    w.run[lane], w.segment[lane], w.busy[lane], w.most_steps[lane] = i, 0, 1.0, w.max_steps[row_of(w.max_steps, i)]
+    w.steps[lane] = w.rejected[lane] = w.failed[lane] = w.stiff_steps[lane] = w.landing[lane] = 0.0
     w.evaluations[lane] = 0.0
     peaks = w.peaks[row_of(w.peaks, i)]
     for m in range(w.n):
@@ -173,29 +172,25 @@ def _start(w: Any) -> None:
                 w.outputs[i, 0, m] = w.y[m, lane]
             counts[OUTPUTS] = 1
         _find_next_output(w, lane)
-        if counts[RECORDS] == 0:
+        if w.steps[lane] == 0.0:
             _record(w, lane)
 
 
 @compiled
 def _choose_sizes(w: Any) -> None:
     """Choose the step of each lane: the proposed size, up to the end of its segment or the time where a step has to
-    end.
+    end; zero where there is no run.
     """
-    for lane in range(LANES):
-        h = w.proposed[lane]
-        left = w.end[lane] - w.t[lane]
-        remaining = min(left, w.aim[lane] - w.t[lane])
-        if w.landing[lane] == 0:
-            # No tiny last step: two equal steps are better than a full one and a remainder.
-            if h >= remaining * (1.0 - SQRT_EPS):
-                h = remaining
-            elif 2.0 * h > remaining:
-                h = 0.5 * remaining
-        h = min(h, left)  # a step onto a guard may aim a rounding beyond
-        w.h[lane] = h if w.run[lane] >= 0 else 0.0
-        w.last[lane] = 1.0 if h == left else 0.0
-        w.onto[lane] = 1.0 if w.landing[lane] > 0 else 0.0
+    t, h, landing = lanes(w.t), lanes(w.proposed), lanes(w.landing) > 0.5
+    left = lanes(w.end) - t
+    remaining = smaller(lanes(w.aim) - t, left)
+    # No tiny last step: two equal steps are better than a full one and a remainder.
+    whole = where(2.0 * h > remaining, 0.5 * remaining, h)
+    whole = where(h >= remaining * (1.0 - SQRT_EPS), remaining, whole)
+    h = smaller(where(landing, h, whole), left)  # a step onto a guard may aim a rounding beyond
+    put(w.h, where(lanes(w.busy) > 0.5, h, 0.0))
+    put(w.last, where(h == left, 1.0, 0.0))
+    put(w.onto, where(landing, 1.0, 0.0))
 
 
 @compiled
@@ -265,23 +260,17 @@ def _move_on(w: Any) -> None:
     for m in range(w.n_ledger):
         put(w.q_largest[m], larger(absolute(lanes(w.y[w.n + m])), lanes(w.q_largest[m])))
     _take(w, w.t, t_new)
-    for flag in (w.begins, w.again):
+    for flag in (w.begins, w.again, w.failed):
         _take(w, flag, same(0.0))
+    _take(w, w.steps, lanes(w.steps) + 1.0)
+    stiff_steps = lanes(w.stiff_steps)
+    fewer = larger(stiff_steps - 1.0, same(0.0))
+    _take(w, w.stiff_steps, where(lanes(w.stiff) > 0.5, stiff_steps + 2.0, fewer))
     # An error far below the tolerance tells the controller nothing more.
     _take(w, w.h_last, lanes(w.h))
     _take(w, w.root_last, larger(lanes(w.root), w.least_root))
     _take(w, w.proposed, lanes(w.following))
     _take(w, w.aim, where(t_new >= lanes(w.aim), np.inf, lanes(w.aim)))
-
-
-@compiled
-def _accept(w: Any, lane: int) -> None:
-    """Count an accepted step."""
-    w.steps[lane] += 1
-    w.failed[lane] = 0
-    stiff = w.stiff[lane] > 0.5
-    w.stiff_steps[lane] = w.stiff_steps[lane] + 2 if stiff else max(w.stiff_steps[lane] - 1, 0)
-    _record(w, lane)
 
 
 @compiled
@@ -310,7 +299,7 @@ def _look_for_guards_anew(w: Any, lane: int) -> None:
 
 @compiled
 def _conclude(w: Any, lane: int) -> None:
-    """Decide about a trial step: repeat it, shorter or onto a guard, or accept it."""
+    """Decide about a trial step that may not be accepted as it is: repeat it, shorter or onto a guard, or accept it."""
     h = w.h[lane]
     if w.again[lane] > 0.5 and w.is_noise(w, lane):
         w.stiff_steps[lane] += STIFF_STEPS
@@ -336,18 +325,47 @@ def _conclude(w: Any, lane: int) -> None:
 
 
 @compiled
-def _continue(w: Any, lane: int) -> None:
-    """Go on after a step, or give the run up where its guards are unclear or explicit steps make no progress."""
-    i = w.run[lane]
-    if w.taken[lane] > 0.5:
-        _accept(w, lane)
-        _go_on(w, lane)
-    doubtful = w.unclear[lane] + (w.failed[lane] > MOST_TRIALS) + (w.stiff_steps[lane] >= 2 * STIFF_STEPS) > 0
-    spent = w.steps[lane] + w.rejected[lane] >= w.max_steps[row_of(w.max_steps, i)]
+def _put_pending(w: Any, pending: Any) -> None:
+    """Mark the lanes of a mask in which something is to be done one by one."""
+    put(w.pending, where(pending & (lanes(w.busy) > 0.5), 1.0, 0.0))
+
+
+@compiled
+def _conclude_all(w: Any) -> None:
+    """Decide about the trial steps. A usual one is accepted: it passes, and nothing happens in it."""
+    usual = (lanes(w.norm) < 1.0) & (lanes(w.defect_at) == 1.0) & (lanes(w.crossing) == 1.0) & (lanes(w.onto) < 0.5)
+    usual = usual & ~(lanes(w.next_output) <= lanes(w.t_new)) & (lanes(w.again) < 0.5)
+    put(w.taken, where(usual, lanes(w.busy), 0.0))
+    _put_pending(w, ~usual)
+    for lane in range(LANES):
+        if w.pending[lane] > 0.5:
+            _conclude(w, lane)
+
+
+@compiled
+def _doubtful(w: Any) -> Any:
+    """Mask of lanes whose runs are given up: their guards are unclear, or explicit steps make no progress."""
+    slow = (lanes(w.failed) > float(MOST_TRIALS)) | (lanes(w.stiff_steps) >= 2.0 * STIFF_STEPS)
+    spent = lanes(w.steps) + lanes(w.rejected) >= lanes(w.most_steps)
     # A step onto a guard may be shorter than time resolves: near rupture the state changes by much within it.
-    stuck = w.landing[lane] == 0 and not w.proposed[lane] > ULPS * w.t[lane]
-    if w.run[lane] >= 0 and (doubtful or spent or stuck):
-        _give_up(w, lane)
+    stuck = (lanes(w.landing) < 0.5) & ~(lanes(w.proposed) > ULPS * lanes(w.t))
+    return (lanes(w.unclear) > 0.5) | slow | spent | stuck
+
+
+@compiled
+def _continue_all(w: Any) -> None:
+    """Go on after the steps: where one ends at an event, a segment or the run; where a run is given up."""
+    taken = lanes(w.taken) > 0.5
+    ends = (lanes(w.t) == lanes(w.end)) | (lanes(w.landing) > 0.5)
+    _put_pending(w, taken & (ends if w.records.shape[1] == 0 else taken))
+    for lane in range(LANES):
+        if w.pending[lane] > 0.5:
+            _record(w, lane)
+            _go_on(w, lane)
+    _put_pending(w, _doubtful(w))
+    for lane in range(LANES):
+        if w.pending[lane] > 0.5:
+            _give_up(w, lane)
 
 
 @compiled
@@ -381,7 +399,7 @@ def _step(w: Any) -> None:
     set_weights(w)
     w.try_step(w)
     w.propose(w)
-    good = lanes(w.norm) < 1.0
+    good = (lanes(w.norm) < 1.0) & (lanes(w.busy) > 0.5)
     put(w.unclear, 0.0)
     if any_lane(good):
         w.find_stiff(w)
@@ -397,14 +415,9 @@ def _step(w: Any) -> None:
         if shown:
             w.check_outputs(w, good)
         find_crossings(w, good & (lanes(w.defect_at) == 1.0), close)
-    put(w.taken, 0.0)
-    for lane in range(LANES):
-        if w.run[lane] >= 0:
-            _conclude(w, lane)
+    _conclude_all(w)
     _move_on(w)
-    for lane in range(LANES):
-        if w.run[lane] >= 0:
-            _continue(w, lane)
+    _continue_all(w)
     _write_margins(w)
 
 

@@ -53,9 +53,11 @@ MEMORY = {
     # flags: a start or restart; the first step of a segment, the last one; a step onto a guard; one that is repeated;
     # one that is stiff; guards of which it is unclear whether they are met; a step that is taken
     **_arrays("fresh begins last onto again stiff unclear taken"),
-    # the run of each lane, -1 where there is none, and the run that has just ended there; its segment; steps, rejected
-    # ones, those in a row; twice the stiff ones; trials of a step onto a guard
-    **_arrays("run over segment steps rejected failed stiff_steps landing", kind=int),
+    # whether a lane has a run, and whether something is to be done for it alone; its steps, rejected ones, those in a
+    # row, most of both; twice the stiff ones; trials of a step onto a guard
+    **_arrays("busy pending steps rejected failed most_steps stiff_steps landing"),
+    # the run of each lane, -1 where there is none, and the run that has just ended there; its segment
+    **_arrays("run over segment", kind=int),
 }
 """Arrays that the loop writes to, whatever the method: type and shape, with a place for each lane."""
 
@@ -75,12 +77,29 @@ RADAU_MEMORY = {
     # imaginary part of the real one; coefficients of the predictor
     **_arrays("z g parts predictor", 5, "n"),
     **_arrays("imaginary error rhs", "n"),
-    # derivatives of the rates, in units of the weights; Newton matrices (system, real and imaginary part), overwritten
-    # by their factors, with flags of the rows that are exchanged
+    # derivatives of the rates, in units of the weights; those by time, which the code writes too; Newton matrices
+    # (system, real and imaginary part), overwritten by their factors, with flags of the rows that are exchanged
     **_arrays("jacobian", "n", "n"),
+    **_arrays("time_slopes", "n"),
     **_arrays("matrix", 3, 2, "n", "n"),
     **_arrays("exchanged", 3, "n", "n"),
     # Newton's method: contraction, now and of the last step; error of the first guess
     **_arrays("theta contraction guess_error"),
 }
 """Arrays of the loop with steps of Radau IIA."""
+
+ROSENBROCK_MEMORY = {
+    # rates at the start, increments of the stages, rates and states at the end, as the code of the step writes them; it
+    # continues with the derivatives of the rates and a flag of doubtful factors, and reads the weights
+    **_arrays("k", 11, "columns"),
+    **_arrays("jacobian", "n", "n"),
+    **_arrays("time_slopes", "n"),
+    **_arrays("doubtful"),
+    **_arrays("weight", "n"),
+    **MEMORY,
+    # the real matrix for checks against the equations, with flags of the rows that are exchanged, and right-hand sides
+    **_arrays("matrix", 1, 2, "n", "n"),
+    **_arrays("exchanged", 1, "n", "n"),
+    **_arrays("imaginary rhs", "n"),
+}
+"""Arrays of the loop with linearly implicit steps."""

@@ -390,20 +390,26 @@ def _propose_by_order(w: Any) -> None:
 
 @compiled
 def propose_size(w: Any) -> None:
-    """Propose the size of the next step: also such that Newton's method contracts well, and that a state below its
-    tolerance, where no error counts, grows at most e-fold by its own derivative.
-    """
+    """Propose the size of the next step: also such that Newton's method contracts well."""
     propose(w)
     _propose_by_order(w)
     h, theta = lanes(w.h), where(lanes(w.guess_error) > 1.0, lanes(w.theta), 0.0)
     convergent = h * larger(square_root(CONTRACTING / theta), same(LEAST_CONVERGENT))
+    put(w.following, smaller(lanes(w.following), where(theta > 0.0, convergent, np.inf)))
+    limit_growth(w)
+
+
+@compiled
+def limit_growth(w: Any) -> None:
+    """Limit the next step such that a state below its tolerance, where no error counts, grows at most e-fold by its own
+    derivative.
+    """
     fastest = same(0.0)
     for m in range(w.n):
         driven = (lanes(w.y[m]) > 0.0) | (lanes(w.y[m]) < 0.0) | (absolute(lanes(w.k[0, m])) > 0.0)
         grows = driven & (absolute(lanes(w.y[m])) < w.atol[m])
         fastest = where(grows, larger(fastest, lanes(w.jacobian[m, m])), fastest)
-    limit = smaller(where(theta > 0.0, convergent, np.inf), where(fastest > 0.0, 1.0 / fastest, np.inf))
-    put(w.following, smaller(lanes(w.following), limit))
+    put(w.following, smaller(lanes(w.following), where(fastest > 0.0, 1.0 / fastest, np.inf)))
 
 
 @compiled

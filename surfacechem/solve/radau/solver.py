@@ -100,7 +100,10 @@ def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[N
 
 
 def _usual_room(problem: Problem, steps: int, events: int) -> Room:
-    return steps * problem.record_steps, events * bool(problem.margins), INSIDE_ROWS * bool(problem.line_error), events
+    ends = problem.edges is NO_EDGES and all(margin.terminal for margin in problem.margins)
+    # Pages that are never read are cleared all the same.
+    rows = min(events, len(problem.margins)) if ends else events
+    return steps * problem.record_steps, rows, INSIDE_ROWS * bool(problem.line_error), events
 
 
 def batch_of(

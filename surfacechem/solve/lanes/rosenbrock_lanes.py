@@ -1,0 +1,136 @@
+"""The loop over lanes with linearly implicit steps of order 5 (Rodas5P), of which each lane takes the same work.
+
+A step is a single call of code made for the equations, without iterations. Runs whose matrices lose digits in it are
+left to implicit steps.
+
+Source: Steinebach (2023), BIT Numerical Mathematics 63, article 27, doi 10.1007/s10543-023-00967-x.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile.rosenbrock import CHANGES, DENSE, STAGES
+from surfacechem.compile.rosenbrock import GAMMA as GAMMA_OF_STAGES
+from surfacechem.compile.vectors import LANES
+from surfacechem.solve.lanes.lane_linear import differentiate, factor
+from surfacechem.solve.lanes.lane_run import CONSTANTS, run_through
+from surfacechem.solve.lanes.lane_step import larger, propose, put_start
+from surfacechem.solve.lanes.layout import NUMBERS, ORDER, ROSENBROCK_MEMORY, SIZES
+from surfacechem.solve.lanes.radau_lanes import check_outputs, find_defects, is_noise, limit_growth
+from surfacechem.solve.lanes.vector import absolute, exponential, lanes, logarithm, put, same, where
+from surfacechem.solve.radau.driver import LEAST_NORM
+from surfacechem.solve.radau.record import StepperRecord, laying_out
+from surfacechem.solve.radau.work import compiled, evaluate, weighted_sums
+from surfacechem.tolerances import TINY
+
+STEP = CONSTANTS + 1
+"""Row of the code of a step in the table of addresses."""
+END_STAGE = 1 + STAGES
+"""Row of the rates at the end of the step; that of the states there follows."""
+POWER = 0.2
+"""Exponent of the size of a step: the error of the embedded solution goes with h^5."""
+
+
+def _polynomials() -> NDArray[np.float64]:
+    """Return the coefficients of x, x^2, ... in the change over a fraction x of the step, a row for each power, by the
+    rate at the start (not used) and the increments.
+    """
+    table = np.zeros((ORDER, 1 + STAGES))
+    table[0, 1:] = [*CHANGES[-1], 1.0]
+    table[:3, 1:] += DENSE
+    table[1:4, 1:] -= DENSE
+    return table
+
+
+_POLYNOMIALS = _polynomials()
+_polynomial = weighted_sums(_POLYNOMIALS, LANES)
+_quarters = weighted_sums([[x**d for d in range(1, 1 + ORDER)] @ _POLYNOMIALS for x in (0.25, 0.5, 0.75)], LANES)
+
+
+@compiled
+def fifth_root(a: Any) -> Any:
+    """The fifth root, for step sizes of an estimate of order 4."""
+    return exponential(POWER * logarithm(a))
+
+
+@compiled
+def try_step(w: Any) -> None:
+    """Take a step of each lane, and set the norm of its local error."""
+    put_start(w)
+    put(w.inputs[1 + w.n], lanes(w.h))
+    evaluate(w, STEP, w.k)
+    put(w.evaluations, lanes(w.evaluations) + float(STAGES))
+    norm = same(0.0)
+    for m in range(w.n):
+        end = lanes(w.k[1 + END_STAGE, m])
+        put(w.y_new[m], end)
+        size = w.rtol * larger(absolute(lanes(w.y[m])), absolute(end)) + w.atol[m]
+        error = absolute(lanes(w.k[STAGES, m])) / larger(size, TINY)
+        norm = where(error <= norm, norm, error)  # not larger(): NaN must be seen
+    put(w.norm, norm)
+
+
+@compiled
+def propose_size(w: Any) -> None:
+    """Propose the size of the next step."""
+    propose(w)
+    limit_growth(w)
+
+
+@compiled
+def find_stiff(w: Any) -> None:
+    """No step is too stiff, but one whose matrix has lost digits is unclear."""
+    put(w.stiff, 0.0)
+    put(w.unclear, where(lanes(w.norm) < 1.0, lanes(w.doubtful), 0.0))
+
+
+@compiled
+def put_roughly(w: Any, x: float) -> None:
+    """Set the inputs to time and state at a quarter point of each step, by its polynomial."""
+    every = LANES * w.n
+    _quarters(int(4.0 * x) - 1, w.k.ctypes.data, every, every, w.rates.ctypes.data)
+    put(w.inputs[0], lanes(w.t) + x * lanes(w.h))
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y[m]) + lanes(w.rates[m]))
+
+
+@compiled
+def interpolate(w: Any, columns: int) -> None:
+    """The polynomials of the steps, and the matrices for checks of them."""
+    every, rate = LANES * w.n, 1.0 / lanes(w.h)
+    for d in range(ORDER):
+        _polynomial(d, w.k.ctypes.data, every, every, w.polynomial[d].ctypes.data)
+        for m in range(w.n):
+            put(w.polynomial[d, m], lanes(w.polynomial[d, m]) * rate)
+    put_start(w)
+    differentiate(w)
+    factor(w, 0, rate / GAMMA_OF_STAGES, same(0.0))
+
+
+@compiled
+def keep_step(w: Any) -> None:
+    """Nothing: a step is not predicted from the last one."""
+
+
+_METHOD = {
+    "end_stage": END_STAGE,
+    "root_of": fifth_root,
+    "least_root": LEAST_NORM**POWER,
+    "try_step": try_step,
+    "propose": propose_size,
+    "is_noise": is_noise,
+    "find_stiff": find_stiff,
+    "put_roughly": put_roughly,
+    "interpolate": interpolate,
+    "find_defects": find_defects,
+    "check_outputs": check_outputs,
+    "keep_step": keep_step,
+}
+_lay_out = laying_out(StepperRecord("RosenbrockLanes", SIZES, NUMBERS, ROSENBROCK_MEMORY, _METHOD))
+
+
+def run_linearly(first: int, last: int, memory: Any, batch: Any) -> None:
+    """Solve runs first to last - 1 of a batch."""
+    run_through(_lay_out(batch, memory), first, last)
