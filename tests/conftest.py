@@ -1,3 +1,4 @@
+import gc
 from pathlib import Path
 
 import pytest
@@ -8,8 +9,14 @@ from hypothesis import settings
 settings.register_profile("surfacechem", deadline=None, max_examples=30)
 settings.load_profile("surfacechem")
 
-EVERY_CASE = ("test_zoo", "test_cases", "test_dataset", "test_scene_view", "test_case_files")
-"""Files of tests that ask for every shipped case or its run, which case_runs.py keeps for all in a worker."""
+# What tests share is kept to the end: at the usual rate a worker looks through all of it again and again.
+gc.set_threshold(100_000, 20, 50)
+
+EVERY_CASE = (
+    *("test_zoo", "test_cases", "test_dataset", "test_scene_view", "test_case_files"),
+    *("test_vectors", "test_edges", "test_typeset", "test_refinement"),
+)
+"""Files of tests that ask for many shipped cases or their runs, which case_runs.py keeps for all in a worker."""
 
 
 LONG = (
