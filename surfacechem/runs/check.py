@@ -31,8 +31,9 @@ from surfacechem.results.audit import active_cautions
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array, Problem
 from surfacechem.solve.diagnose import time_scales
+from surfacechem.solve.radau.solver import consistent
 from surfacechem.solve.run import Model
-from surfacechem.tolerances import CONSERVED_RATE, FEW_EPS, NO_AMOUNT, RUN_EPS, TINY
+from surfacechem.tolerances import CONSERVED_RATE, FEW_EPS, NO_AMOUNT, TINY
 
 LUMP_BIOT = 0.1
 """Largest Biot number at which a lump is accurate enough: its relaxation rate errs by 3 % there."""
@@ -65,29 +66,17 @@ class Start:
 
 
 def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
-    """Solve for rates and algebraic variables at the start by Newton's method; None if it breaks down."""
-    system = model.system
-    n = len(system.states)
-    algebraic = np.array([state.algebraic for state in system.states])
-    parameters = [p.at(0.0) if p.load else values[p.path] for p in system.parameters]
-    y, ydot = system.initial_state(values), np.zeros(n)
-    for _ in range(50):
-        inputs = np.concatenate([[0.0], y, ydot, parameters])
-        K, M = model.program.derivatives(inputs)
-        # The unknowns are the rates of evolved states and the values of algebraic ones.
-        matrix, residual = np.where(algebraic, K, M), model.program.residual(inputs)
-        if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(residual))):
-            return None
-        try:
-            change = np.linalg.solve(matrix, -residual)
-        except np.linalg.LinAlgError:
-            return None
-        y, ydot = y + np.where(algebraic, change, 0.0), ydot + np.where(algebraic, 0.0, change)
-        if np.all(np.abs(change) <= RUN_EPS * np.maximum(np.abs(np.where(algebraic, y, ydot)), TINY)):
-            break
-    inputs = np.concatenate([[0.0], y, ydot, parameters])
+    """Solve for rates and algebraic variables at the start; None if that breaks down."""
+    system, program = model.system, model.program
+    parameters = np.array([p.at(0.0) if p.load else values[p.path] for p in system.parameters])
+    given = system.initial_state(values)
+    found = consistent(program, 0.0, given, np.zeros_like(given), parameters)
+    if not found.valid:
+        return None
+    inputs = program.filled(np.concatenate([[0.0], found.y, found.ydot, parameters]))
+    K, M = program.derivatives(inputs)
     outputs = dict(zip((item.name for item in system.outputs), model.output_function(inputs).tolist(), strict=True))
-    return Start(y, ydot, M, K, outputs, inputs)
+    return Start(found.y, found.ydot, M, K, outputs, inputs)
 
 
 def rates(start: Start) -> NDArray[np.complex128]:
