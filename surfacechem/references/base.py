@@ -13,7 +13,7 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, dataclass_transform
@@ -231,6 +231,8 @@ class Reference(ABC):
     `from_scene` decides whether it is the scene's."""
     readings: ClassVar[Mapping[str, tuple[str, str]]] = {}
     """Readings of its parameters from a scene, including those of its bases."""
+    parameters: ClassVar[tuple[Field[Any], ...]] = ()
+    """Its parameters, with their specifications."""
     statistics: ClassVar[tuple[str, ...]] = ()
     """Names of its properties that a sweep compares with the statistics of each run."""
 
@@ -239,10 +241,11 @@ class Reference(ABC):
         cls.readings = {name: how for kind in cls.__mro__[::-1] for name, how in vars(kind).get("readings", {}).items()}
         cls.name = name_of(cls.__name__)
         dataclass(frozen=True, kw_only=True)(cls)
+        cls.parameters = fields(cls)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
         """Check every parameter against its range."""
-        for item in fields(self):  # type: ignore[arg-type]
+        for item in self.parameters:
             item.metadata["spec"].check(f"{self.name}: {item.name}", getattr(self, item.name))
 
     @classmethod

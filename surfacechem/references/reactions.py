@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -84,7 +83,7 @@ class Bonding(PerfectContact):
                 f"{1.0 - self.free_capacity:.17g} of it. Lower K_2 or raise phi_i."
             )
 
-    @property
+    @cached_property
     def free_capacity(self) -> float:
         r"""Fraction of the initial capacity that the unformed bonds leave, :math:`1-\kappa_2x_0`.
 
@@ -127,11 +126,10 @@ class Bonding(PerfectContact):
         }
 
 
-def _from_reference(case: PerfectContact, t: Array) -> Quantities:
-    """Return the solution of a case of `Bonding` that starts without bonds at the reference temperature."""
-    given = {item.name: getattr(case, item.name) for item in fields(case)}
-    every = Bonding(**given, T_i=case.T_0).quantities(t)
-    return {name: every[name] for name in ("phi", "T", "q_1", "q_2")}
+@lru_cache(maxsize=1)  # whatever follows from its parameters is computed once
+def _from_reference(case: PerfectContact) -> Bonding:
+    """Return the case of `Bonding` that starts without bonds at the reference temperature."""
+    return Bonding(**{item.name: getattr(case, item.name) for item in case.parameters}, T_i=case.T_0)
 
 
 class ExothermicBonding(PerfectContact):
@@ -154,7 +152,8 @@ class ExothermicBonding(PerfectContact):
     readings = read(potential="K_0", relaxation_time="tau")
 
     def quantities(self, t: Array) -> Quantities:
-        return _from_reference(self, t)
+        every = _from_reference(self).quantities(t)
+        return {name: every[name] for name in ("phi", "T", "q_1", "q_2")}
 
 
 class EndothermicBonding(PerfectContact):
@@ -186,7 +185,8 @@ class EndothermicBonding(PerfectContact):
             raise InputError(f"{self.name}: K_2 must be below T_0 (C_1 + C_2 + C_c), the capacity it takes away.")
 
     def quantities(self, t: Array) -> Quantities:
-        return _from_reference(self, t)
+        every = _from_reference(self).quantities(t)
+        return {name: every[name] for name in ("phi", "T", "q_1", "q_2")}
 
 
 class BimolecularBonding(Reference):

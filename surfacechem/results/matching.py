@@ -156,7 +156,7 @@ def match(name: str, options: Mapping[str, float], view: SceneView) -> Reference
     # Options supply parameters that the scene does not determine; others must agree with the scene.
     kind = references.get(name)
     values, told = dict(options), kind.from_scene(view)
-    for item in dataclasses.fields(kind):  # type: ignore[arg-type]
+    for item in kind.parameters:
         found, spec = told.get(item.name), item.metadata["spec"]
         if found is None:
             if item.name not in values and item.default is dataclasses.MISSING:

@@ -286,8 +286,7 @@ class EdgeCourse(NamedTuple):
     """
 
 
-@dataclass(slots=True)
-class Result:
+class Result(NamedTuple):
     """A trajectory up to its end. Outputs beyond the end are absent."""
 
     problem: Problem

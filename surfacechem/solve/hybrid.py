@@ -200,7 +200,7 @@ class Hybrid:
             outputs = np.concatenate([arc.result.outputs, np.tile(reached.y, count)])
             ledger = np.concatenate([arc.result.ledger_outputs, np.tile(arc.result.ledger, count)])
             shown = np.append(arc.result.times, times - arc.start.t)
-            result = replace(arc.result, times=shown, outputs=outputs, ledger_outputs=ledger)
+            result = arc.result._replace(times=shown, outputs=outputs, ledger_outputs=ledger)
             self.arcs[-1] = replace(arc, result=result, times=np.append(arc.times, times))
             self._outputs_written += len(times)
 
@@ -297,7 +297,7 @@ def carried(problem: Problem, jumper: Jumper) -> Flow[tuple[Result, list[Jump], 
     jumps = jumper.carried_out(*result.course, start, end)
     result = with_arc_segments(problem, result)
     if result.status is Status.MAX_STEPS and sum(jump.edge.return_time is not None for jump in jumps) > MANY_REBOUNDS:
-        return replace(result, status=Status.FAILED), jumps, ENDLESS
+        return result._replace(status=Status.FAILED), jumps, ENDLESS
     return result, jumps, ""
 
 
@@ -305,9 +305,9 @@ def with_arc_segments(problem: Problem, result: Result) -> Result:
     """Return a result of the compiled loop with its arcs as segments."""
     assert result.course is not None
     arcs = result.course.arcs
-    problem = replace(problem, segments=np.append(arcs[:, 0], problem.segments[-1]), parameters=arcs[:, 5:])
     if len(arcs) == 1 and not len(result.course.jumps):
-        return replace(result, problem=problem)
+        return result._replace(problem=problem)
+    problem = replace(problem, segments=np.append(arcs[:, 0], problem.segments[-1]), parameters=arcs[:, 5:])
 
     def segments(column: int, count: int) -> Index:
         """Return the arc of each of this number of points."""
@@ -324,7 +324,7 @@ def with_arc_segments(problem: Problem, result: Result) -> Result:
         kept = in_order(t, segment)
         ends = np.append(arcs[1:, 0], result.t)[segment[kept]]
         known = States(np.minimum(t[kept], ends), y[kept], ledger[kept], segment[kept])
-    return replace(result, problem=problem, segment=outputs.segment, steps=steps, inside=None, known=known)
+    return result._replace(problem=problem, segment=outputs.segment, steps=steps, inside=None, known=known)
 
 
 def ended_at_start(problem: Problem, status: Status, end: float, ledger: Array) -> Result:
@@ -348,8 +348,8 @@ def with_start(problem: Problem, result: Result) -> Result:
     if not start.valid:
         return result
     ledger = np.zeros((1, problem.program.n_ledger))
-    shown = replace(result, problem=problem, times=at, outputs=start.y[None], ledger_outputs=ledger)
-    return replace(shown, segment=None, inside=None, known=None)
+    shown = result._replace(problem=problem, times=at, outputs=start.y[None], ledger_outputs=ledger)
+    return shown._replace(segment=None, inside=None, known=None)
 
 
 def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, ledger: Array) -> Result:
@@ -359,7 +359,7 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
     segments = np.array([*(arc.start.t for arc in arcs), problem.segments[-1]])
     problem = replace(problem, segments=segments, parameters=np.array([arc.start.parameters for arc in arcs]))
     if len(arcs) == 1 and arcs[0].is_whole:
-        return replace(last, problem=problem, status=status, t=end, ledger=ledger, times=arcs[0].times)
+        return last._replace(problem=problem, status=status, t=end, ledger=ledger, times=arcs[0].times)
     events = _rows([(arc, arc.result.events, slice(None)) for arc in arcs])
     return Result(
         problem=problem,

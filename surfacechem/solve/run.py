@@ -180,12 +180,15 @@ class Trajectory:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore the machine code of the problem from the model, which has compiled it again."""
         problem = replace(state["result"].problem, program=state["model"].program)
-        vars(self).update(state, result=replace(state["result"], problem=problem))
+        vars(self).update(state, result=state["result"]._replace(problem=problem))
 
     def at(self, rows: States) -> Trajectory:
         """Return the trajectory with these states as outputs."""
         t, y, ledger, segment = rows
-        found = replace(self, result=replace(self.result, times=t, outputs=y, ledger_outputs=ledger, segment=segment))
+        result = self.result._replace(times=t, outputs=y, ledger_outputs=ledger, segment=segment)
+        found = Trajectory(
+            self.model, self.run, result, self.values, self.status, self.reason, self.seconds, self.jumps
+        )
         vars(found).update({name: known for name, known in vars(self).items() if name == "_at_steps"})
         return found
 
@@ -339,7 +342,7 @@ class Trajectory:
         if np.all(result.outputs >= least) and (steps is None or np.all(steps.y >= least)):
             return self
         steps = steps and replace(steps, y=np.maximum(steps.y, least))
-        clipped = replace(result, outputs=np.maximum(result.outputs, least), steps=steps)
+        clipped = result._replace(outputs=np.maximum(result.outputs, least), steps=steps)
         return replace(self, result=clipped)
 
     @cached_property

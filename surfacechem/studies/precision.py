@@ -227,7 +227,7 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
     trajectory, scene = subject.tight(subject.methods()[0], MIN_RTOL), subject.case.scene
     result = trajectory.result
     # A second evaluation at times one rounding earlier gives the effect of rounding on the exact values.
-    perturbed = replace(trajectory, result=replace(result, times=result.times * (1 - EPS)))
+    perturbed = replace(trajectory, result=result._replace(times=result.times * (1 - EPS)))
     try:
         named = reference.name, reference.options
         exact, moved = (

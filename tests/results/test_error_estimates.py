@@ -155,7 +155,7 @@ def test_other_events_in_the_second_run_are_said(stick_slip):
     count = len(event_times(trajectory)[last])
     assert f"which had other events: {count - 1} {last} instead of {count}" in found.source
     assert (found.error, found.variables[EVENTS]) == (EPS, 0.0)  # the states agree, and events that both have
-    away = replace(second, result=replace(second.result, outputs=2 * second.result.outputs))
+    away = replace(second, result=second.result._replace(outputs=2 * second.result.outputs))
     assert math.isnan(estimated(trajectory, away).error)  # one of the two went another way
     late = against_exact(trajectory, stick_slip.case.scene, "stick-slip", {}, away)
     assert late.variables[EVENTS] == 0.0
@@ -308,7 +308,7 @@ def test_species_that_never_exceed_the_absolute_tolerance_are_no_error():
     """A state of 1e-31 that two runs know to no digit is known as well as its tolerance asks."""
     trajectory = surfacechem.run("exothermic").trajectory
     first, second = (
-        replace(trajectory, result=replace(trajectory.result, outputs=trajectory.result.outputs * [part, 1.0]))
+        replace(trajectory, result=trajectory.result._replace(outputs=trajectory.result.outputs * [part, 1.0]))
         for part in (1e-31, 3e-31)
     )
     errors, _ = state_differences(first, second)

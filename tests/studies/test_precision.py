@@ -206,7 +206,7 @@ def test_a_solver_that_raises_is_shown_as_failed(monkeypatch):
 def test_a_run_with_other_events_has_failed():
     subject = subject_of("coulomb-stop")
     truth, trajectory = establish(subject, ["T"]), subject.solve("radau", 1e-8)
-    early = replace(trajectory.result, times=trajectory.result.times[:3])
+    early = trajectory.result._replace(times=trajectory.result.times[:3])
     for changes, objection in (
         ({}, ""),
         ({"jumps": ()}, "other events"),
