@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pickle import PicklingError
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import symengine
@@ -311,6 +311,26 @@ Note = Range | CappedLaw | RatePair | TimeScale | Caution | Profile | Conductor
 N = TypeVar("N", bound=Note)
 
 
+class Total(NamedTuple):
+    """A balanced total, by its columns."""
+
+    variables: list[int]
+    """The total and its existing parts, in the table of states and named quantities."""
+    accounts: list[int]
+    """Accounts of the ledger that explain its change, then others that count as exchange only."""
+    booked: int
+    """Number of the accounts that explain it."""
+
+
+TOTALS = (
+    (("E_total", "U_1", "U_2", "U_c"), ("energy supply",), ("dissipation",)),
+    (("S_total", "S_1", "S_2", "S_c"), ("entropy supply", "entropy production"), ()),
+)
+"""Balanced totals, each with its parts; the kinds of accounts that explain its change, and further kinds that count as
+exchange only.
+"""
+
+
 @dataclass(frozen=True)
 class System:
     """The assembled system: states, equations and everything that is derived from them.
@@ -485,6 +505,11 @@ class System:
         return [*self.state_columns, *self.output_columns]
 
     @cached_property
+    def variable_columns(self) -> dict[str, int]:
+        """Columns of states and named quantities in a table of both, by name."""
+        return {name: j for j, name in enumerate(self.variable_names)}
+
+    @cached_property
     def parameter_columns(self) -> dict[str, int]:
         """Columns of the parameters, by path."""
         return {parameter.path: j for j, parameter in enumerate(self.parameters)}
@@ -504,6 +529,25 @@ class System:
         """Columns of the accounts of each kind."""
         kinds = [account.kind for account in self.ledger]
         return {kind: [j for j, each in enumerate(kinds) if each == kind] for kind in kinds}
+
+    @cached_property
+    def totals(self) -> tuple[Total, ...]:
+        """The balanced totals, energy and entropy, which have these parts and whose changes these accounts explain."""
+        known, columns = self.variable_columns, self.account_columns
+        return tuple(
+            Total(
+                [known[name] for name in (total, *parts) if name in known],
+                [j for kind in (*supplies, *sinks) for j in columns.get(kind, ())],
+                sum(len(columns.get(kind, ())) for kind in supplies),
+            )
+            for (total, *parts), supplies, sinks in TOTALS
+        )
+
+    @cached_property
+    def least_states(self) -> Array:
+        """Least possible values of the states: zero for bonds, minus infinity for others; shape (states,)."""
+        bonds = {account.law for account in self.ledger if account.kind == "bonds"}
+        return np.array([0.0 if state.name in bonds else -np.inf for state in self.states])
 
     @cached_property
     def energy_has_histories(self) -> bool:

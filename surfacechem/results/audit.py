@@ -16,7 +16,7 @@ balance).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function
 from surfacechem.expressions import EXPONENT_CAP
-from surfacechem.model.system import CappedLaw, Caution, Range, RatePair, System
+from surfacechem.model.system import CappedLaw, Caution, Range, RatePair, System, Total
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.solve.contract import Array, Points
 from surfacechem.solve.run import Trajectory
@@ -158,37 +158,24 @@ def resolved(residual: Array, scale: Any, stored: Any, rounding: Any) -> Any:
     return _relative(residual, np.where(unresolved, np.maximum(scale, stored), scale))
 
 
-TOTALS = ("E_total", ("U_1", "U_2", "U_c")), ("S_total", ("S_1", "S_2", "S_c"))
-"""Balanced totals, each with its parts."""
-
-ACCOUNT_KINDS = (("energy supply",), ("dissipation",)), (("entropy supply", "entropy production"), ())
-"""Kinds of accounts that explain the change of each total, and of further ones that count as exchange only."""
-
-
-def residuals(system: System, named: Mapping[str, Array], ledger: Array) -> list[tuple[Array, Any]]:
-    """Return the residuals of the balances of TOTALS at the outputs of one run or of many, and the largest amounts
+def residuals(totals: Sequence[Total], values: Any, ledger: Array) -> list[tuple[Array, Any]]:
+    """Return the residuals of the balances of totals at the outputs of one run or of many, and the largest amounts
     exchanged up to then.
 
-    ``named`` has the existing TOTALS and parts [..., times], ``ledger`` the accounts [..., times, accounts].
+    ``values`` has the totals and their parts [..., times] by column, ``ledger`` the accounts [..., times, accounts].
     """
     # Transitions at the very start are booked before the first output.
     ledger = ledger - ledger[..., :1, :]
     found = []
-    for (total, parts), (supplies, sinks) in zip(TOTALS, ACCOUNT_KINDS, strict=True):
-        residual, *changes = [named[name] - named[name][..., :1] for name in (total, *parts) if name in named]
-        own = accounts(system, ledger, *supplies, *sinks)
-        booked = sum(len(system.account_columns.get(kind, ())) for kind in supplies)
-        residual = residual - own[..., :booked].sum(axis=-1)
+    for total in totals:
+        residual, *changes = [values[j] - values[j][..., :1] for j in total.variables]
+        own = ledger[..., total.accounts]
+        residual = residual - own[..., : total.booked].sum(axis=-1)
         exchanged = np.concatenate([own, *[part[..., None] for part in changes]], axis=-1)
         # NumPy is slow in finding the largest of a few numbers in each of many rows, not of a few rows of many.
         in_rows = np.abs(exchanged.reshape(*exchanged.shape[:-2], -1).T, order="C")
         found.append((residual, np.maximum.reduce(in_rows, axis=0, initial=0.0)))
     return found
-
-
-def accounts(system: System, ledger: Array, *kinds: str) -> Array:
-    """Return the columns of a ledger for accounts of these kinds."""
-    return ledger[..., [j for kind in kinds for j in system.account_columns.get(kind, ())]]
 
 
 class Balances(NamedTuple):
@@ -201,34 +188,32 @@ class Balances(NamedTuple):
     @classmethod
     def of(cls, trajectory: Trajectory) -> Balances:
         """Return the residuals along a trajectory."""
-        system, ledger, outputs = trajectory.model.system, trajectory.result.ledger_outputs, trajectory.outputs
-        names = [name for total, parts in TOTALS for name in (total, *parts) if name in system.output_columns]
+        system, ledger, values = trajectory.model.system, trajectory.result.ledger_outputs, trajectory.tables[0].T
         sites = np.zeros(len(ledger))
         for j in system.account_columns.get("bonds", ()):
-            bonds = trajectory.columns[system.ledger[j].law][0]
+            bonds = values[system.variable_columns[system.ledger[j].law]]
             sites = np.maximum(sites, np.abs(bonds - bonds[:1] - (ledger[:, j] - ledger[:1, j])))
-        known = {name: outputs[:, system.output_columns[name]] for name in names}
-        energy, entropy = residuals(system, known, ledger)
+        energy, entropy = residuals(system.totals, values, ledger)
         return cls(energy, entropy, sites)
 
 
 def audit(trajectory: Trajectory) -> Audit:
     """Audit a trajectory."""
-    model, result, outputs, steps = trajectory.model, trajectory.result, trajectory.outputs, trajectory.result.steps
-    system, column = model.system, model.system.output_columns
+    model, result, steps = trajectory.model, trajectory.result, trajectory.result.steps
+    system, (energies, *_) = model.system, model.system.totals
     (energy, exchanged), (entropy, turned), sites = Balances.of(trajectory)
     energy_scale, entropy_scale = float(exchanged), float(turned)
     if steps:  # a brief load may come and go between outputs; the ends of steps resolve it
-        energy_scale = max(energy_scale, largest(accounts(system, steps.ledger, "energy supply", "dissipation")))
-    E, S = (outputs[:, column[name]] for name in ("E_total", "S_total"))
-    energy_stored = max(trajectory.roundings["E_total"] / EPS, largest(E))
-    entropy_stored = max(trajectory.roundings["S_total"] / EPS, entropy_scale, largest(S))
+        energy_scale = max(energy_scale, largest(steps.ledger[:, energies.accounts]))
+    E, S = (trajectory.column(name) for name in ("E_total", "S_total"))
+    energy_stored = max(trajectory.roundings["E_total"] / EPS, largest(E[0]))
+    entropy_stored = max(trajectory.roundings["S_total"] / EPS, entropy_scale, largest(S[0]))
     roundings, untimed = LAST_DIGITS, 0.0
     if steps and len(steps.t):
         roundings += len(steps.t)
         if system.energy_has_histories:  # a steep one is known only to within the last digits of time
             later = model.evaluate(result, steps.t * (1 + EPS), steps.y, steps.ydot, steps.segment)
-            untimed = largest(later[:, column["E_total"]] - trajectory.columns["E_total"][1])
+            untimed = largest(later[:, system.output_columns["E_total"]] - E[1])
     rounding = EPS * energy_stored * roundings + untimed
     left = largest(energy)
     if left > rounding + OPEN_BALANCE * TIGHTEST_JUDGED * energy_scale:
@@ -255,12 +240,12 @@ def audit(trajectory: Trajectory) -> Audit:
 
 def least_productions(trajectory: Trajectory) -> dict[str, float]:
     """Return the least entropy production of each law over outputs and steps."""
-    least, system = {}, trajectory.model.system
-    for j in system.account_columns.get("entropy production", ()):
-        rates = trajectory.within_bounds.everywhere(f"sigma_{system.ledger[j].law}")
+    least, system, within = {}, trajectory.model.system, trajectory.within_bounds
+    for law in (system.ledger[j].law for j in system.account_columns.get("entropy production", ())):
+        rates = within.everywhere(f"sigma_{law}")
         if len(rates):
             past = _is_past_its_end(trajectory, rates[-1]) and len(rates) > 1
-            least[system.ledger[j].law] = float((rates[:-1] if past else rates).min())
+            least[law] = float((rates[:-1] if past else rates).min())
     return least
 
 
@@ -321,11 +306,10 @@ def _steps(trajectory: Trajectory) -> Points:
 
 def _exchanged_by_errors(trajectory: Trajectory) -> float:
     """Return the energy that errors within the tolerance of the states would exchange over all steps [J/m^2]."""
-    system, ledger, points = trajectory.model.system, trajectory.model.program.ledger, _steps(trajectory)
-    columns = [j for kind in ("energy supply", "dissipation") for j in system.account_columns.get(kind, ())]
+    ledger, points, (energies, *_) = trajectory.model.program.ledger, _steps(trajectory), trajectory.model.system.totals
     if ledger is None or len(points.t) < 2:
         return 0.0
-    powers = next(_rounding_of(trajectory, points, ledger, columns, np.arange(len(points.t) - 1)))
+    powers = next(_rounding_of(trajectory, points, ledger, energies.accounts, np.arange(len(points.t) - 1)))
     return float(powers @ np.diff(points.t))
 
 

@@ -108,7 +108,7 @@ def coverage_columns(system: System, columns: Iterable[Column]) -> list[Column]:
 def profile_values(trajectory: Trajectory, profile: Profile) -> Array:
     """Return the temperatures across a body at the output times, shape (times, points)."""
     names = [profile.surface, *profile.states, *([profile.far] if profile.far else [])]
-    return np.stack([trajectory.columns[name][0] for name in names], axis=1)
+    return np.stack([trajectory.column(name)[0] for name in names], axis=1)
 
 
 def profile_columns(trajectory: Trajectory) -> list[Column]:
@@ -272,11 +272,11 @@ def surface_columns(trajectory: Trajectory, surface: CurvedSurfaces) -> tuple[li
     chosen = np.unique(np.linspace(0, len(times) - 1, MOST_SURFACE_TIMES).round().astype(int))
     columns = [Column(TIME, (TIME,), times[chosen], "s", "times at which the surfaces are looked at")]
     with integrating():
-        surface, gaps = surface.of_run(trajectory.values), trajectory.columns["g_n"][0][chosen]
+        surface, gaps = surface.of_run(trajectory.values), trajectory.column("g_n")[0][chosen]
         # A run may end a rounding beyond the range of tabulated approaches.
         approaches, stretches = np.clip(gaps, *surface.approach), np.ones_like(gaps)
-        if "J_c" in trajectory.columns:
-            stretches = trajectory.columns["J_c"][0][chosen]
+        if stretch := trajectory.column("J_c"):
+            stretches = stretch[0][chosen]
         columns += [*_totals(surface, approaches, stretches), *_fields(surface, approaches, stretches)]
     return columns, INTEGRATION_TIME.seconds - before
 

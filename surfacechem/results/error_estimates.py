@@ -348,7 +348,7 @@ def _squares(rtol: float, trajectory: Trajectory, least: Array) -> list[str]:
     The energy of a spring at zero extension is an example: no digit of such a zero is known, and none is missed.
     """
     changes = rtol * np.maximum(np.abs(trajectory.result.outputs), least)
-    made, by_less = (np.array(list(trajectory.sensitivities(each).values())) for each in (changes, changes / FINER_BY))
+    made, by_less = (trajectory.sensitivities(each) for each in (changes, changes / FINER_BY))
     largest = np.abs(trajectory.outputs).max(axis=0, initial=0.0)
     squares = (largest <= made) & (2 * FINER_BY * by_less <= made)
     return [name for name, is_one in zip(trajectory.model.system.output_columns, squares, strict=True) if is_one]

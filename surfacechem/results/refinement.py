@@ -129,8 +129,8 @@ class _Resolution:
     def update(self, block: Trajectory) -> None:
         """Update ranges and allowed errors with the outputs of a block."""
         values, sample, part = _quantities(block)[1], block.sample, block.run.picture or 0.0
-        unknown = [*sample.sensitivities(EPS * np.abs(sample.result.outputs) + sample.result.problem.atol).values()]
-        self.noise = np.maximum(self.noise, np.pad(RUN_ERROR * np.array(unknown), (values.shape[1] - len(unknown), 0)))
+        unknown = sample.sensitivities(EPS * np.abs(sample.result.outputs) + sample.result.problem.atol)
+        self.noise = np.maximum(self.noise, np.pad(RUN_ERROR * unknown, (values.shape[1] - len(unknown), 0)))
         # Early rows, whose layers are unresolved, do not count for the ranges.
         late = ~unresolved(block.model.system, block.run.times[-1], block.result.times)
         parts = values, values if late.all() else values[late]

@@ -18,7 +18,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.format.plans import Plan
 from surfacechem.model.system import System
-from surfacechem.results.audit import LAST_DIGITS, TOTALS, residuals, resolved
+from surfacechem.results.audit import LAST_DIGITS, residuals, resolved
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import REACHES, STATUSES, Columns, Keep, crossed, reason_table, variable
 from surfacechem.solve import EXPLICIT, IMPLICIT
@@ -213,7 +213,7 @@ class ArrayRuns:
         system, keep = self.model.system, self.keep
         wanted = {*keep.last, *keep.max, *keep.min, *keep.series}
         if keep.balances:
-            wanted |= {name for total, parts in TOTALS for name in (total, *parts)}
+            wanted |= {system.variable_names[j] for total in system.totals for j in total.variables}
             wanted |= {system.ledger[j].law for j in system.account_columns.get("bonds", ())}
         chosen = [item for item in system.outputs if item.name in wanted]
         expressions = [system.expand(item.expression) for item in chosen]
@@ -453,7 +453,9 @@ class ArrayRuns:
     def totals(self) -> Function:
         """Totals that are balanced: energy and entropy."""
         system = self.model.system
-        return compile_function(system.inputs, [system.expand(system.find(name).expression) for name, _ in TOTALS])
+        return compile_function(
+            system.inputs, [system.expand(system.find(name).expression) for name in ("E_total", "S_total")]
+        )
 
     def balances(self, found: Ends, rows: Array, values: Mapping[str, Array], reached: Mask) -> Columns:
         """Return the errors of the balances of each run over its outputs, as in its audit."""
@@ -471,15 +473,15 @@ class ArrayRuns:
             return np.where(reached, filled, filled[:, :1])
 
         # The same residuals and roundings as in the audit of one run, over the existing outputs.
-        every = [name for total, parts in TOTALS for name in (total, *parts)]
-        named = {name: whole(values[name]) for name in every if name in values}
+        names = system.variable_names
+        named = {j: whole(values[names[j]]) for total in system.totals for j in total.variables}
         outputs = np.asfortranarray(batch.outputs[..., n:])
         ledger = outputs if all_reached else np.where(reached[..., None], outputs, outputs[:, :1])
         rounded = of_each(np.fmax, owner, self._rounding(rows), len(reached))
         columns: Columns = {}
-        left = zip(("energy", "entropy"), TOTALS, residuals(system, named, ledger), strict=True)
-        for j, (which, (name, _), (residual, scale)) in enumerate(left):
-            stored = np.maximum(rounded[:, j] / EPS, np.abs(named[name]).max(axis=1))
+        left = zip(("energy", "entropy"), system.totals, residuals(system.totals, named, ledger), strict=True)
+        for j, (which, total, (residual, scale)) in enumerate(left):
+            stored = np.maximum(rounded[:, j] / EPS, np.abs(named[total.variables[0]]).max(axis=1))
             stored = np.maximum(stored, scale) if which == "entropy" else stored
             rounding = EPS * stored * (LAST_DIGITS + batch.counts[:, RECORDS])
             columns[f"{which}_error"] = resolved(residual, scale, stored, rounding)
@@ -491,7 +493,8 @@ class ArrayRuns:
 
     def _rounding(self, rows: Array) -> Array:
         """Return the largest change of each total by the last bit of a state, shape (rows, 2)."""
-        totals, worst, moved = self.totals(rows), np.zeros((len(rows), len(TOTALS))), rows.copy()
+        totals, moved = self.totals(rows), rows.copy()
+        worst = np.zeros_like(totals)
         for j in range(1, 1 + self.n):
             moved[:, j] *= 1 + EPS
             np.fmax(worst, np.abs(self.totals(moved) - totals), out=worst)

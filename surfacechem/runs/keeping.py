@@ -186,8 +186,9 @@ def at_end(run: Trajectory) -> dict[str, float]:
 
 def extremes(run: Trajectory) -> dict[str, dict[str, float]]:
     """Return the largest and smallest value of each quantity over outputs and steps of a run, and after its jumps."""
-    leaps, names = run.discontinuities, list(run.columns)
-    seen = np.array([np.concatenate([*run.columns[name], leaps.after[name][leaps.last]]) for name in names])
+    leaps, names = run.discontinuities, run.model.system.variable_names
+    after = np.array([leaps.after[name][leaps.last] for name in names])
+    seen = np.concatenate([*(table.T for table in run.tables), after], axis=1)
     with np.errstate(invalid="ignore"):
         found = {which: best.reduce(seen, axis=1, initial=np.nan) for which, (best, _) in EXTREMES.items()}
     return {which: dict(zip(names, values.tolist(), strict=True)) for which, values in found.items()}
@@ -234,7 +235,7 @@ class RunByRun:
         found = extremes(run) if keep.max or keep.min else {}
         row |= {f"{name}_{which}": of[name] for which, of in found.items() for name in getattr(keep, which)}
         for name in keep.series:
-            row[name] = np.append(run.columns[name][0], np.full(times - len(result.times), np.nan))
+            row[name] = np.append(run.column(name)[0], np.full(times - len(result.times), np.nan))
         return row | self._events(run)
 
     def _events(self, run: Trajectory) -> dict[str, float]:

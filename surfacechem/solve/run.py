@@ -281,10 +281,10 @@ class Trajectory:
     @cached_property
     def roundings(self) -> dict[str, float]:
         """Largest change of each named quantity by one rounding of a state."""
-        found = [[*block.sensitivities(EPS * block.result.outputs).values()] for block in self._blocks()]
+        found = [block.sensitivities(EPS * block.result.outputs) for block in self._blocks()]
         return dict(zip(self.model.system.output_columns, np.fmax.reduce(found), strict=True))
 
-    def sensitivities(self, changes: Array) -> dict[str, float]:
+    def sensitivities(self, changes: Array) -> Array:
         """Return the largest change of each named quantity by ``changes`` of one state, shape (times, states)."""
         model, system, times = self.model, self.model.system, self.result.times
         # Of the states inside bodies only the first enters a flux; the others are not named.
@@ -295,29 +295,42 @@ class Trajectory:
             rows = np.array([self._inputs] * len(chunk))
             for perturbed, j in zip(rows, chunk, strict=True):
                 perturbed[:, 1 + j] += changes[:, j]
-            values = model.named(rows.reshape(len(chunk) * len(times), rows.shape[-1]))
+            apart = model.named(rows.reshape(-1, rows.shape[-1])).reshape(len(chunk), *self.outputs.shape)
             with np.errstate(invalid="ignore"):  # quantities may be infinite
-                apart = np.abs(values.reshape(len(chunk), *self.outputs.shape) - self.outputs)
+                np.abs(np.subtract(apart, self.outputs, out=apart), out=apart)
                 worst = np.fmax(worst, np.fmax.reduce(apart.max(axis=1, initial=0.0)))
-        return dict(zip(system.output_columns, worst, strict=True))
+        return worst
 
     def everywhere(self, name: str) -> Array:
         """Return a state or a named quantity at the output times and at every step; empty if the name is unknown."""
-        return np.concatenate(self.columns.get(name, ((),)))
+        return np.concatenate(self.column(name) or [np.empty(0)])
+
+    def column(self, name: str) -> list[Array]:
+        """Return a state or a named quantity at the output times, and at every step if any is recorded; empty if the
+        name is unknown.
+        """
+        j = self.model.system.variable_columns.get(name)
+        return [] if j is None else [table[:, j] for table in self.tables]
+
+    @property
+    def tables(self) -> list[Array]:
+        """States and named quantities at the output times, and at every step if any is recorded, each of shape
+        (times, variables).
+        """
+        steps = [self._at_steps] if self.result.steps is not None and len(self.result.steps.t) else []
+        return [self._at_outputs, *steps]
 
     @cached_property
-    def columns(self) -> dict[str, tuple[Array, ...]]:
-        """States and named quantities, each at the output times and at every step."""
-        tables = [(*self.result.outputs.T, *self.outputs.T), *([self._at_steps] if self._at_steps else [])]
-        return dict(zip(self.model.system.variable_names, zip(*tables, strict=True), strict=True))
+    def _at_outputs(self) -> Array:
+        return np.concatenate((self.result.outputs, self.outputs), axis=1)
 
     @cached_property
-    def _at_steps(self) -> tuple[Array, ...]:
-        """States and named quantities at every step, which do not depend on the outputs; empty if none is recorded."""
+    def _at_steps(self) -> Array:
+        """Variables at every step, which do not depend on the outputs."""
         steps = self.result.steps
-        if steps is None or not len(steps.t):
-            return ()
-        return *steps.y.T, *self.model.evaluate(self.result, steps.t, steps.y, steps.ydot, steps.segment).T
+        assert steps is not None
+        named = self.model.evaluate(self.result, steps.t, steps.y, steps.ydot, steps.segment)
+        return np.concatenate((steps.y, named), axis=1)
 
     @cached_property
     def discontinuities(self) -> Discontinuities:
@@ -336,9 +349,7 @@ class Trajectory:
     @cached_property
     def within_bounds(self) -> Trajectory:
         """The trajectory with bonding states that roundoff has made negative set to zero."""
-        result, steps = self.result, self.result.steps
-        bonds = {account.law for account in self.model.system.ledger if account.kind == "bonds"}
-        least = np.array([0.0 if state.name in bonds else -np.inf for state in self.model.system.states])
+        result, steps, least = self.result, self.result.steps, self.model.system.least_states
         if np.all(result.outputs >= least) and (steps is None or np.all(steps.y >= least)):
             return self
         steps = steps and replace(steps, y=np.maximum(steps.y, least))

@@ -40,7 +40,7 @@ def solved(item, until, outputs=81):
 
 
 def velocity(trajectory):
-    return trajectory.columns["v"][0]
+    return trajectory.column("v")[0]
 
 
 def forward(law, pull, m, times, y, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6):
@@ -62,7 +62,7 @@ def forward(law, pull, m, times, y, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6)
 
 
 def reversals(trajectory):
-    v = trajectory.columns["v"][1]
+    v = trajectory.column("v")[1]
     return int(np.sum(np.diff(np.sign(v[v != 0])) != 0))
 
 
