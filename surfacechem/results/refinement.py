@@ -45,12 +45,12 @@ def _two_sided(t: Array) -> tuple[Array, Mask]:
 def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
     """Return the mask of rows whose connecting lines, over time and its logarithm, miss no value by more than allowed.
 
-    ``values`` has shape (times, quantities), ``allowed`` one entry for each quantity; rows that are ``kept`` stay. The
+    ``values`` has shape (quantities, times), ``allowed`` one entry for each quantity; rows that are ``kept`` stay. The
     first choice is as dense as the curvature asks for; where a line misses, the worst row is added until none does.
     """
     kept = kept.copy()
     kept[[0, -1]] = True
-    scaled = np.divide(values.T, allowed[:, None], out=np.zeros(values.shape[::-1]), where=allowed[:, None] > 0)
+    scaled = np.divide(values, allowed[:, None], out=np.zeros(values.shape), where=allowed[:, None] > 0)
     ways = np.array([t, np.log(np.maximum(t, t[t > 0].min(initial=1.0)))])
     kept[1:] |= np.diff(np.floor(np.cumsum(_lines(ways, scaled))), prepend=0.0) > 0
     rows = np.flatnonzero(~kept)
@@ -75,11 +75,13 @@ def _lines(ways: Array, values: Array) -> Array:
     found = np.zeros(max(values.shape[1] - 1, 0))
     if len(found) > 1:
         rise = values[:, 1:] - values[:, :-1]
+        slope, bends = np.empty_like(rise), np.empty_like(rise[:, 1:])
         for way in ways:
             length = way[1:] - way[:-1]
             with np.errstate(all="ignore"):  # no length over the logarithm before the first time
-                slope = rise / length
-                bend = np.abs(slope[:, 1:] - slope[:, :-1]).max(axis=0, initial=0.0) / (way[2:] - way[:-2])
+                np.divide(rise, length, out=slope)
+                np.abs(np.subtract(slope[:, 1:], slope[:, :-1], out=bends), out=bends)
+                bend = bends.max(axis=0, initial=0.0) / (way[2:] - way[:-2])
                 # A line of this length misses its length squared times bend / 4.
                 density = np.nan_to_num(np.sqrt(3 / 8 * bend), posinf=0.0)
             found = np.fmax(found, length / 2 * (np.append(density, density[-1]) + np.append(density[0], density)))
@@ -91,29 +93,32 @@ def _missed(ways: Array, values: Array, left: Index, rows: Index, right: Index) 
     ``values`` has shape (quantities, times).
     """
     start, missed = values.take(left, axis=1), np.zeros(len(rows))
-    rise, risen = values.take(right, axis=1) - start, values.take(rows, axis=1) - start
+    rise, risen = (np.subtract(each, start, out=each) for each in (values.take(at, axis=1) for at in (right, rows)))
     begun = ways.take(left, axis=1)
     length, passed = ways.take(right, axis=1) - begun, ways.take(rows, axis=1) - begun
+    apart = start  # its memory
     for part in np.divide(passed, length, out=np.zeros_like(length), where=length > 0):
-        apart = part * rise
+        np.multiply(part, rise, out=apart)
         np.abs(np.subtract(risen, apart, out=apart), out=apart)
         missed = np.fmax(missed, apart.max(axis=0, initial=0.0))
     return missed
 
 
 def _edges(values: Array) -> Mask:
-    """Return the mask of rows with an extreme of a quantity, and next to a change between finite and not finite."""
-    found, number = np.zeros(len(values), bool), np.isfinite(values)
+    """Return the mask of times with an extreme of a quantity, and next to a change between finite and not finite;
+    ``values`` has shape (quantities, times).
+    """
+    found, number = np.zeros(values.shape[1], bool), np.isfinite(values)
     if not values.size:
         return found
     low = high = values
     if not number.all():
-        changes = np.any(number[1:] != number[:-1], axis=1)
+        changes = np.any(number[:, 1:] != number[:, :-1], axis=0)
         found[1:] |= changes
         found[:-1] |= changes
         low, high = np.where(number, values, np.inf), np.where(number, values, -np.inf)
-    found[high.argmax(axis=0)] = True
-    found[low.argmin(axis=0)] = True
+    found[high.argmax(axis=1)] = True
+    found[low.argmin(axis=1)] = True
     return found
 
 
@@ -128,14 +133,15 @@ class _Resolution:
 
     def update(self, block: Trajectory) -> None:
         """Update ranges and allowed errors with the outputs of a block."""
-        values, sample, part = _quantities(block)[1], block.sample, block.run.picture or 0.0
+        values, sample, part = _finite(block.quantities), block.sample, block.run.picture or 0.0
         unknown = sample.sensitivities(EPS * np.abs(sample.result.outputs) + sample.result.problem.atol)
-        self.noise = np.maximum(self.noise, np.pad(RUN_ERROR * unknown, (values.shape[1] - len(unknown), 0)))
+        known = np.zeros(len(values) - len(unknown))  # states and accounts
+        self.noise = np.maximum(self.noise, np.concatenate((known, RUN_ERROR * unknown)))
         # Early rows, whose layers are unresolved, do not count for the ranges.
         late = ~unresolved(block.model.system, block.run.times[-1], block.result.times)
-        parts = values, values if late.all() else values[late]
-        sides = [(-part.min(axis=0, initial=np.inf), part.max(axis=0, initial=-np.inf)) for part in parts]
-        self.reach = np.maximum(self.reach, np.concatenate(sides))
+        parts = [values] if late.all() else [values, values[:, late]]
+        sides = [(-part.min(axis=1, initial=np.inf), part.max(axis=1, initial=-np.inf)) for part in parts]
+        self.reach = np.maximum(self.reach, np.concatenate((sides[0], sides[-1])))
         every, known = self.reach[:2].sum(axis=0), self.reach[2:].sum(axis=0)
         # Errors of the run need not be resolved, but they are at most this part of a value at any tolerance. The rest
         # of the part is the error of known states for the states between them.
@@ -145,16 +151,14 @@ class _Resolution:
 
     def needed(self, block: Trajectory, moments: Array) -> Mask:
         """Return the mask of outputs that resolve a block, with both sides of events at these ``moments``."""
-        t, (table, values) = block.result.times, (each[:, self.varies] for each in _quantities(block))
-        return needed_rows(t, values, self.allowed[self.varies], _sides(t, moments) | _edges(table))
+        t, values = block.result.times, block.quantities[self.varies]
+        return needed_rows(t, _finite(values), self.allowed[self.varies], _sides(t, moments) | _edges(values))
 
 
-def _quantities(block: Trajectory) -> tuple[Array, Array]:
-    """Return the quantities over time, shape (times, quantities), and the same with zeros for NaN and infinity."""
-    result = block.result
-    table = np.concatenate([result.outputs.T, result.ledger_outputs.T, block.outputs.T]).T  # of each the times together
-    number = np.isfinite(table)
-    return table, table if number.all() else np.where(number, table, 0.0)
+def _finite(values: Array) -> Array:
+    """Return values with zeros for NaN and infinity."""
+    number = np.isfinite(values)
+    return values if number.all() else np.where(number, values, 0.0)
 
 
 def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States]:
@@ -164,8 +168,9 @@ def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States
     """
     result, y, rates = trajectory.result, trajectory.result.outputs, trajectory.rates
     t, segment, problem = result.times, result.segments_at(result.times, result.segment), result.problem
-    left = np.flatnonzero((np.diff(t) > 0) & (np.diff(segment) == 0) & (t[:-1] > 0))
-    right, length, parameters = left + 1, np.diff(t)[left], problem.parameters[segment[left]]
+    lengths = np.diff(t)
+    left = np.flatnonzero((lengths > 0) & (np.diff(segment) == 0) & (t[:-1] > 0))
+    right, length, parameters = left + 1, lengths[left], problem.parameters[segment[left]]
     middle = t[left] + length / 2
     # The middle of the cubic Hermite interpolant.
     states = (y[left] + y[right]) / 2 + length[:, None] / 8 * (rates[left] - rates[right])
@@ -247,7 +252,7 @@ def shared_times(runs: Sequence[Trajectory], most: int) -> tuple[float, ...]:
     count = np.append(0.0, np.cumsum(SHARED_DENSITY * density * lengths))
     parts = min(int(np.ceil(count[-1])) + 1, most)
     times = [np.interp(np.linspace(0, count[-1], parts), count, every), every[[0, -1]]]
-    sides = [p.result.times[_sides(p.result.times, _event_times(p)) | _edges(p.result.outputs)] for p in resolved]
+    sides = [p.result.times[_sides(p.result.times, _event_times(p)) | _edges(p.result.outputs.T)] for p in resolved]
     marked = np.unique(np.concatenate([*sides, *map(_steps, resolved)]))
     return tuple(np.unique(np.concatenate([*times, marked if len(marked) <= most else []])).tolist())
 

@@ -357,6 +357,11 @@ class Trajectory:
         return replace(self, result=clipped)
 
     @cached_property
+    def quantities(self) -> Array:
+        """States, accounts and named quantities at the output times, shape (quantities, times)."""
+        return np.concatenate((self.result.outputs.T, self.result.ledger_outputs.T, self.outputs.T))
+
+    @cached_property
     def outputs(self) -> Array:
         """Named quantities at the output times, shape (times, outputs)."""
         if len(self.result.times) > ROWS_AT_ONCE:

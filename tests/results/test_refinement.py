@@ -119,10 +119,10 @@ def test_rows_are_needed_where_a_line_over_time_or_its_logarithm_would_miss():
     t = np.array([0.0, 1e-3, 1e-2, 0.1, 0.2, 0.3, 1.0])
     straight, kink = 2.0 * t, np.maximum(t - 0.2, 0.0)
     none = np.zeros(len(t), bool)
-    kept = needed_rows(t, np.column_stack([straight, kink]), np.array([1e9, 1e-3]), none)
+    kept = needed_rows(t, np.stack([straight, kink]), np.array([1e9, 1e-3]), none)
     assert t[kept].tolist() == [0.0, 0.2, 0.3, 1.0]
     t = np.append(0.0, np.geomspace(1e-6, 1.0, 200))
-    kept = needed_rows(t, t[:, None], np.array([0.1]), np.zeros(len(t), bool))
+    kept = needed_rows(t, t[None], np.array([0.1]), np.zeros(len(t), bool))
     assert np.abs(np.interp(np.log(t[1:]), np.log(t[1:][kept[1:]]), t[1:][kept[1:]]) - t[1:]).max() <= 0.1
     assert 3 < kept.sum() < 12
 
