@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, Protocol
 
@@ -282,6 +283,13 @@ class Interface:
     """Engine that evaluates the rates that are not formulas."""
     remarks: Sequence[str] = ()
     """Remarks on the source of the laws, for readers of the results."""
+
+    @cached_property
+    def owners(self) -> dict[str, list[str]]:
+        """Paths of the laws, and of the factors of their parameters, by the kind of law."""
+        kinds = {"potential": self.potentials, "friction": self.frictions, "reaction": self.reactions}
+        laws: dict[str, Sequence[Law]] = {**kinds, "limit": self.limits}
+        return {kind: [x.path for law in own for x in (law, *law.factors)] for kind, own in laws.items()}
 
     @property
     def electrodes(self) -> Sequence[Electrode]:

@@ -81,6 +81,9 @@ MOST_CURVES = 7
 """Largest number of values of a parameter that are drawn as separate curves: the number of colours."""
 
 
+DOTS = 160
+"""Dots per inch of pictures."""
+
 COLUMN_WIDTH = ContextVar("widest", default=6.4)
 """Width of a figure of one column [inch]."""
 
@@ -121,7 +124,13 @@ def save(plot: Figure, target: Any, kind: str) -> None:
     """Write a figure as png, svg or pdf; equal figures give equal bytes."""
     metadata: Mapping[str, None] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
     with matplotlib.rc_context(STYLE):
-        plot.savefig(target, format=kind, dpi=160, metadata=metadata)
+        if kind != "png":
+            plot.savefig(target, format=kind, dpi=DOTS, metadata=metadata)
+            return
+        usual, canvas = plot.dpi, plot.canvas
+        plot.dpi = DOTS
+        FigureCanvasAgg(plot).print_png(target)  # type: ignore[no-untyped-call]  # `savefig` draws twice
+        plot.dpi, plot.canvas = usual, canvas
 
 
 def write(plot: Figure, target: Path) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, fields
 from fractions import Fraction
 from functools import cached_property
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 __all__ = ["Array", "Parameters", "Quantities", "Reference", "SceneView", "read"]
 
 
-LAWS = {"potential": "potentials", "friction": "frictions", "reaction": "reactions", "limit": "limits"}
-"""Readings of the constants of laws, and the laws of the interface that have them."""
+LAWS = ("potential", "friction", "reaction", "limit")
+"""Readings of the constants of laws of the interface."""
 
 PATHS = {"ramp": "loading.{}.ramp.rate", "normal": "mechanics.normal.{}", "tangential": "mechanics.tangential.{}"}
 """Readings of rates at which variables are driven [per second], and of supports of the bodies, by their paths."""
@@ -61,7 +61,7 @@ class SceneView:
         """Return one of the readings above or below, by name if it needs one; a preceding minus reverses the sign."""
         own = name.removeprefix("-")
         if reading in LAWS:
-            value = self._constant(getattr(self.scene.interface, LAWS[reading]), own)
+            value = self._constant(reading, own)
         elif reading in PATHS:
             value = self.run.values.get(PATHS[reading].format(own))
         else:
@@ -71,10 +71,10 @@ class SceneView:
 
     # -- laws, loads, supports -----------------------------------------------------------------------------------------
 
-    def _constant(self, laws: Iterable[Law], name: str) -> float | None:
+    def _constant(self, kind: str, name: str) -> float | None:
         """Return a constant of one of the laws, or of a factor of one of its parameters."""
-        values, owners = self.run.values, (owner for law in laws for owner in (law, *law.factors))
-        found = [values[path] for owner in owners if (path := f"{owner.path}.{name}") in values]
+        values, owners = self.run.values, self.scene.interface.owners[kind]
+        found = [values[path] for owner in owners if (path := f"{owner}.{name}") in values]
         return found[0] if len(found) == 1 else None
 
     def surface(self, name: str) -> float | None:

@@ -97,38 +97,47 @@ class Bonding(PerfectContact):
         initial = (1.0 - self.phi_i) ** 2
         return initial * np.exp(-2.0 * t / self.tau), -initial * np.expm1(-2.0 * t / self.tau)
 
-    def heated(self, t: Array) -> tuple[Array, Array, Array]:
-        """Return temperature, its rise above the initial one, and the capacity over which released heat is shared."""
+    def heated(self, t: Array) -> tuple[Array, Array, Array, Array]:
+        """Return the square x of the unbonded fraction, temperature, its rise above the initial one, and the capacity
+        over which released heat is shared.
+        """
         x, gone = self.unbonded_squared(t)
         kappa_0, kappa_2 = (K / (self.T_0 * self.C) for K in (self.K_0, self.K_2))
         # 1 - kappa_2 x as a sum of positive numbers
         factor = self.free_capacity + kappa_2 * gone if kappa_2 > 0.0 else 1.0 - kappa_2 * x
         released = self.T_0**2 * kappa_0 * gone + 2.0 * self.T_0 * self.D * t / self.C
         T = np.sqrt((self.T_i**2 * self.free_capacity + released) / factor)
-        return T, (released - self.T_i**2 * kappa_2 * gone) / factor / (T + self.T_i), self.C * factor
+        return x, T, (released - self.T_i**2 * kappa_2 * gone) / factor / (T + self.T_i), self.C * factor
+
+    def exchanged(self, t: Array, x: Array, T: Array, capacity: Array) -> dict[str, Array]:
+        """Return bonding state, temperature and heat into the bodies, from what :meth:`heated` returns."""
+        share = (x / self.tau * (self.K_0 - self.K_2 * (T / self.T_0) ** 2) + self.D) / capacity
+        phi = self.phi_i - (1.0 - self.phi_i) * np.expm1(-t / self.tau)
+        return {"phi": phi, "T": T, "q_1": self.C_1 * share, "q_2": self.C_2 * share}
 
     def quantities(self, t: Array) -> Quantities:
-        x, _ = self.unbonded_squared(t)
-        T, rise, capacity = self.heated(t)
+        x, T, rise, capacity = self.heated(t)
         excess, relative = self.T_i - self.T_0 + rise, T / self.T_0
         bond_energy = self.K_0 - self.K_2 * relative**2
-        share = (x / self.tau * bond_energy + self.D) / capacity
         bond_entropy = -0.5 * x * (self.K_1 + 2.0 * self.K_2 * relative) / self.T_0
         stiffness = self.K_0 + self.K_1 * relative + self.K_2 * relative**2
         return {
-            "phi": self.phi_i - (1.0 - self.phi_i) * np.expm1(-t / self.tau),
-            "T": T,
-            "q_1": self.C_1 * share,
-            "q_2": self.C_2 * share,
+            **self.exchanged(t, x, T, capacity),
             "U_c": self.model.energy(excess, self.C_c, self.T_0) + 0.5 * x * bond_energy,
             "S_total": self.model.entropy(excess, self.C, self.T_0) + bond_entropy,
             "sigma_chem": x * stiffness / (self.tau * T),
         }
 
 
+def _from_reference(case: PerfectContact, t: Array) -> Quantities:
+    """Return the solution of a case of `Bonding` that starts without bonds at the reference temperature."""
+    bonds = _unbonded(case)
+    x, T, _, capacity = bonds.heated(t)
+    return bonds.exchanged(t, x, T, capacity)
+
+
 @lru_cache(maxsize=1)  # whatever follows from its parameters is computed once
-def _from_reference(case: PerfectContact) -> Bonding:
-    """Return the case of `Bonding` that starts without bonds at the reference temperature."""
+def _unbonded(case: PerfectContact) -> Bonding:
     return Bonding(**{item.name: getattr(case, item.name) for item in case.parameters}, T_i=case.T_0)
 
 
@@ -152,8 +161,7 @@ class ExothermicBonding(PerfectContact):
     readings = read(potential="K_0", relaxation_time="tau")
 
     def quantities(self, t: Array) -> Quantities:
-        every = _from_reference(self).quantities(t)
-        return {name: every[name] for name in ("phi", "T", "q_1", "q_2")}
+        return _from_reference(self, t)
 
 
 class EndothermicBonding(PerfectContact):
@@ -185,8 +193,7 @@ class EndothermicBonding(PerfectContact):
             raise InputError(f"{self.name}: K_2 must be below T_0 (C_1 + C_2 + C_c), the capacity it takes away.")
 
     def quantities(self, t: Array) -> Quantities:
-        every = _from_reference(self).quantities(t)
-        return {name: every[name] for name in ("phi", "T", "q_1", "q_2")}
+        return _from_reference(self, t)
 
 
 class BimolecularBonding(Reference):

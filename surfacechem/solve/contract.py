@@ -343,7 +343,7 @@ class Result(NamedTuple):
 
 def in_order(t: Array, segment: Index) -> Index:
     """Return indices that sort points by segment and by time within it, each time once."""
-    order = np.lexsort((t, segment))
+    order = np.lexsort((t, segment)) if segment.any() else t.argsort(kind="stable")
     t, segment, new = t[order], segment[order], np.ones(len(order), dtype=bool)
     new[1:] = (t[1:] != t[:-1]) | (segment[1:] != segment[:-1])
     return order[new]
