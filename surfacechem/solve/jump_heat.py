@@ -97,10 +97,6 @@ class JumpHeat:
         taken = np.einsum("ijk,ik->ij", parts, by_source[:, :-1]) + rubbed * by_source[:, -1:]
         return self._with_energy(rows, U + taken, U, C), taken, T
 
-    def warmed(self, rows: Array, by_source: Array, shares: Array | None) -> Array:
-        """Return inputs with the temperatures of the nodes after they have taken the heat."""
-        return self.distributed(rows, by_source, shares)[0]
-
     def with_heat(self, rows: Array, taken: Array) -> Array:
         """Return inputs with the temperatures of the nodes after each has taken its heat, shape (rows, nodes)."""
         _, U, C, _ = self.at(rows)

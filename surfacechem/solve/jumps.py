@@ -21,7 +21,7 @@ from surfacechem.model.automaton import INTERFACE, REST_TIME_PATH, Edge
 from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import START, System
 from surfacechem.quantities import VELOCITIES
-from surfacechem.solve.contract import Array, EdgeTables, Mask, integers
+from surfacechem.solve.contract import Array, EdgeTables, integers
 from surfacechem.solve.equilibria import BALANCED, Equilibria, FoldPoint, Folds, Point, compiled
 from surfacechem.solve.jump_heat import JumpHeat, LoadPath, LoadStep
 from surfacechem.solve.radau.stepper import (
@@ -385,12 +385,10 @@ class Jumper:
         # Friction never pulls a gap back: it sticks.
         if edge.equilibrates and self.equilibria.would_reverse(after, slack.balanced, slack.friction_noise):
             after = self.equilibria.with_slip(after, 0.0)
-        gain, admissible, done = self._judged(
-            edge, before.inputs()[None], after.inputs()[None], totals[None], np.array([slack.noise]), entropy_out
-        )
-        verdict, gained = ADMISSIBLE if admissible[0] else VIOLATES, float(gain[0])
-        work = lift | {name: lift.get(name, 0.0) + float(more[0]) for name, more in done.items()}
-        return Jump(before.t, edge, before, after, released, gained, verdict, since, work, "", heat_out, entropy_out)
+        gain, admissible, done = self._judged(edge, before.inputs(), after.inputs(), totals, slack.noise, entropy_out)
+        verdict = ADMISSIBLE if admissible else VIOLATES
+        work = lift | {name: lift.get(name, 0.0) + more for name, more in done.items()}
+        return Jump(before.t, edge, before, after, released, gain, verdict, since, work, "", heat_out, entropy_out)
 
     def _reset(self, index: int, before: Point, fold: FoldPoint | None) -> tuple[Point, Point]:
         """Return the point before a jump, and the point after the reset map of the edge."""
@@ -472,7 +470,7 @@ class Jumper:
         """Return the point at which the gaps come to rest, sliding or sticking: friction never pulls sliding back."""
 
         def heat(rows: Array) -> Array:
-            return self._heat.warmed(rows, self._heat_by_source(rows, pending), shares)
+            return self._heat.distributed(rows, self._heat_by_source(rows, pending), shares)[0]
 
         found, start, fold = self.equilibria, pending.start, pending.fold
         slip = 0.0 if found.slip is None else start.parameters[found.slip]
@@ -540,48 +538,39 @@ class Jumper:
         return -1 if edge.heat == "local" else self._source(edge, "n" if edge.heat == "joint" else INTERFACE)
 
     def _heated(self, point: Point, pending: PendingJump, shares: Array | None) -> tuple[Point, float, float, float]:
-        """Return the point with the heat in its nodes; energy released, heat and entropy passed to reservoirs."""
-        rows = point.inputs()[None]
-        heated, *amounts = self._warmed(rows, self._heat_by_source(rows, pending), np.array([pending.energy]), shares)
-        if not np.all(np.isfinite(heated)):
-            raise ImpossibleError(NO_HEAT)
-        released, heat, entropy = (float(amount[0]) for amount in amounts)
-        return replace(point, y=heated[0, 1 : 1 + len(point.y)]), released, heat, entropy
+        """Return the point with the heat in its nodes; energy released, heat and entropy passed to reservoirs.
 
-    def _warmed(
-        self, rows: Array, by_source: Array, energy: Array, shares: Array | None = None
-    ) -> tuple[Array, Array, Array, Array]:
-        """Return inputs with the heat in their nodes; energy released, heat and entropy passed to reservoirs.
-
-        The inputs are NaN where nodes cannot take the heat. Heat that is negligible compared with ``energy`` counts as
-        zero.
+        Heat that is negligible compared with the energy before the jump counts as zero.
         """
-        small = FEW_EPS * np.maximum(self._totals(rows)[:, -2], np.abs(energy))
-        by_source = np.where(np.abs(by_source) <= small[:, None], 0.0, by_source)
-        released, warmed = by_source.sum(axis=1), rows.copy()
-        heat, entropy = np.zeros(len(rows)), np.zeros(len(rows))
-        hot = by_source.any(axis=1)
-        if hot.any():
-            warmed[hot], taken, T = self._heat.distributed(rows[hot], by_source[hot], shares)
-            reservoirs = self._heat.reservoirs
-            heat[hot], entropy[hot] = taken[:, reservoirs].sum(axis=1), (taken / T)[:, reservoirs].sum(axis=1)
-        return warmed, released, heat, entropy
+        rows = point.inputs()[None]
+        by_source = self._heat_by_source(rows, pending)
+        small = FEW_EPS * max(float(self._totals(rows[0])[-2]), abs(pending.energy))
+        by_source[np.abs(by_source) <= small] = 0.0
+        released, heat, entropy = float(by_source.sum()), 0.0, 0.0
+        if by_source.any():
+            rows, taken, T = self._heat.distributed(rows, by_source, shares)
+            out = self._heat.reservoirs
+            heat, entropy = float(taken[:, out].sum()), float((taken / T)[:, out].sum())
+        if not np.all(np.isfinite(rows)):  # nodes cannot take the heat
+            raise ImpossibleError(NO_HEAT)
+        return replace(point, y=rows[0, 1 : 1 + len(point.y)]), released, heat, entropy
 
     def _judged(
-        self, edge: Edge, before: Array, after: Array, totals: Array, noise: Array, entropy_out: Array | float
-    ) -> tuple[Array, Mask, dict[str, Array]]:
-        """Return the entropy that jumps between these rows produce, the second law's verdict, and the work done.
+        self, edge: Edge, before: Array, after: Array, totals: Array, noise: float, entropy_out: float
+    ) -> tuple[float, bool, dict[str, float]]:
+        """Return the entropy that a jump between these inputs produces, the second law's verdict, and the work done.
 
         Negative production is tolerated up to roundoff, and up to the effect of the guard's ``noise`` on entropy and on
         energy, the latter as heat at the temperature of the coldest node.
         """
         perturbed = before.copy()
         if edge.measure:
-            perturbed[:, 1 + self.states.index(edge.measure)] += noise
-        now, still, moved = self._totals(np.concatenate([after, before, perturbed])).reshape(3, len(before), -1)
-        gain = now[:, 1] - totals[:, 1] + entropy_out
-        small = RUN_EPS * np.maximum(np.maximum(np.abs(totals[:, 1]), np.abs(now[:, 1])), np.abs(entropy_out))
-        small += FEW_EPS * still[:, -1] + np.abs(moved[:, 1] - still[:, 1])
+            perturbed[1 + self.states.index(edge.measure)] += noise
+        now, still, moved = self._totals(np.stack([after, before, perturbed]))
+        gain = float(now[1] - totals[1] + entropy_out)
+        small = RUN_EPS * max(abs(totals[1]), abs(now[1]), abs(entropy_out))
+        small += FEW_EPS * still[-1] + abs(moved[1] - still[1])
         if self._heat.nodes:
-            small += np.abs(moved[:, 0] - still[:, 0]) / self._heat.at(before)[0].min(axis=1)
-        return gain, gain >= -small, dict(zip(self.system.far_work, (now[:, 2:-2] - totals[:, 2:-2]).T, strict=True))
+            small += abs(moved[0] - still[0]) / self._heat.at(before[None])[0].min()
+        work = (now[2:-2] - totals[2:-2]).tolist()
+        return gain, bool(gain >= -small), dict(zip(self.system.far_work, work, strict=True))
