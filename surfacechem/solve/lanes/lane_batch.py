@@ -77,20 +77,15 @@ CODE = "vectors.py", "rosenbrock.py", "rosenbrock.json"
 
 def _method(words: str, memory: Mapping[str, Any], module: str, function: str, *parts: str) -> LaneMethod:
     here = Path(__file__).parent
-    own = [here / f"{name}.py" for name in ("vector", "layout", "lane_step", "lane_guards", "lane_run", module, *parts)]
+    own = [here / f"{name}.py" for name in ("vector", "layout", "lane_step", "lane_guards", "lane_run", *parts)]
     sources = [*stepper.sources(), *(here.parent.parent / "compile" / name for name in CODE), *own]
     return LaneMethod(words, stepper.Loop(sources, f"{__package__}.{module}", function, brief=True), memory)
 
 
-EXPLICIT = _method("by explicit steps of order 8", EXPLICIT_MEMORY, "explicit_lanes", "run_explicitly")
-ROSENBROCK = _method(
-    "by linearly implicit steps of order 5",
-    ROSENBROCK_MEMORY,
-    "rosenbrock_lanes",
-    "run_linearly",
-    *("radau_lanes", "lane_linear"),
-)
-RADAU = _method("by Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "lane_linear")
+EXPLICIT = _method("by explicit steps of order 8", EXPLICIT_MEMORY, "lane_run", "run_explicitly")
+_LINEARLY = "by linearly implicit steps of order 5", ROSENBROCK_MEMORY, "rosenbrock_lanes", "run_linearly"
+ROSENBROCK = _method(*_LINEARLY, "radau_lanes", "rosenbrock_lanes")
+RADAU = _method("by Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "radau_lanes")
 
 
 def methods_of(problem: Problem) -> Iterator[LaneMethod]:

@@ -1,4 +1,4 @@
-"""Whole runs, eight at once, compiled: starts, steps, events, load segments and ends.
+"""Whole runs, eight at once, compiled: starts, steps, events, load segments and ends; the loop with explicit steps.
 
 A lane whose run has ended takes the next one. Runs that need more (stiffness, guards that touch zero or start there,
 rates that are not finite, noise) end with status LEFT and are repeated by the stepper for single runs.
@@ -10,6 +10,7 @@ import numpy as np
 
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.contract import Status
+from surfacechem.solve.lanes import lane_step
 from surfacechem.solve.lanes.lane_guards import ends_on_guard, find_crossings, may_cross, start_margins
 from surfacechem.solve.lanes.lane_step import (
     check_inside,
@@ -20,10 +21,11 @@ from surfacechem.solve.lanes.lane_step import (
     set_weights,
     smaller,
 )
-from surfacechem.solve.lanes.layout import ORDER
+from surfacechem.solve.lanes.layout import EXPLICIT_MEMORY, NUMBERS, ORDER, SIZES
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
-from surfacechem.solve.radau.driver import FEWEST_CHECKS
+from surfacechem.solve.radau.driver import FEWEST_CHECKS, LEAST_NORM
 from surfacechem.solve.radau.explicit import STIFF_STEPS
+from surfacechem.solve.radau.record import StepperRecord, laying_out
 from surfacechem.solve.radau.step import loosening
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
 from surfacechem.solve.radau.work import MARGINS, RATES, compiled, evaluate, row_of
@@ -449,3 +451,25 @@ def run_through(w: Any, first: int, last: int) -> None:
             busy = 0
             for lane in range(LANES):
                 busy += w.run[lane] >= 0
+
+
+_METHOD = {
+    "end_stage": lane_step.END_STAGE,
+    "root_of": lane_step.eighth_root,
+    "least_root": LEAST_NORM**0.125,
+    "try_step": lane_step.try_step,
+    "propose": lane_step.propose,
+    "is_noise": lane_step.is_noise,
+    "find_stiff": lane_step.find_stiff,
+    "put_roughly": lane_step.put_roughly,
+    "interpolate": lane_step.interpolate,
+    "find_defects": lane_step.find_defects,
+    "check_outputs": lane_step.check_outputs,
+    "keep_step": lane_step.keep_step,
+}
+_lay_out = laying_out(StepperRecord("ExplicitLanes", SIZES, NUMBERS, EXPLICIT_MEMORY, _METHOD))
+
+
+def run_explicitly(first: int, last: int, memory: Any, batch: Any) -> None:
+    """Solve runs first to last - 1 of a batch."""
+    run_through(_lay_out(batch, memory), first, last)

@@ -14,11 +14,17 @@ from numpy.typing import NDArray
 from surfacechem.compile.rosenbrock import CHANGES, DENSE, STAGES
 from surfacechem.compile.rosenbrock import GAMMA as GAMMA_OF_STAGES
 from surfacechem.compile.vectors import LANES
-from surfacechem.solve.lanes.lane_linear import differentiate, factor
 from surfacechem.solve.lanes.lane_run import CONSTANTS, run_through
 from surfacechem.solve.lanes.lane_step import larger, propose, put_start
 from surfacechem.solve.lanes.layout import NUMBERS, ORDER, ROSENBROCK_MEMORY, SIZES
-from surfacechem.solve.lanes.radau_lanes import check_outputs, find_defects, is_noise, limit_growth
+from surfacechem.solve.lanes.radau_lanes import (
+    check_outputs,
+    differentiate,
+    factor,
+    find_defects,
+    is_noise,
+    limit_growth,
+)
 from surfacechem.solve.lanes.vector import absolute, exponential, lanes, logarithm, put, same, where
 from surfacechem.solve.radau.driver import LEAST_NORM
 from surfacechem.solve.radau.record import StepperRecord, laying_out
