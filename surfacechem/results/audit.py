@@ -83,6 +83,11 @@ class Audit:
         return f"<Audit: energy {self.energy_error:.1e}, entropy {self.entropy_error:.1e}, sites {self.site_error:.1e}>"
 
     @cached_property
+    def _worst(self) -> tuple[float, float]:
+        """Largest residuals of energy and entropy."""
+        return largest(self.energy), largest(self.entropy)
+
+    @cached_property
     def _lost(self) -> tuple[Mapping[str, float], float]:
         return self.losses()
 
@@ -103,14 +108,14 @@ class Audit:
         """Largest energy residual relative to the exchanged energy, or to the stored one if that is lost in its
         rounding.
         """
-        return float(resolved(self.energy, self.energy_scale, self.energy_stored, self.energy_rounding))
+        return float(resolved(self._worst[0], self.energy_scale, self.energy_stored, self.energy_rounding))
 
     @property
     def entropy_error(self) -> float:
         """Largest entropy residual relative to the entropy exchanged or produced, or to the stored one if that is lost
         in its rounding.
         """
-        return float(resolved(self.entropy, self.entropy_scale, self.entropy_stored, self.entropy_rounding))
+        return float(resolved(self._worst[1], self.entropy_scale, self.entropy_stored, self.entropy_rounding))
 
     @property
     def site_error(self) -> float:
@@ -135,8 +140,11 @@ class Audit:
         if self.destroys and not found:
             found = ["the laws together destroy entropy"]
         # The exchanged amount may be less than the rounding of a body's heat content.
-        energy = _relative(np.maximum(np.abs(self.energy) - self.energy_rounding, 0), self.energy_scale)
-        entropy = _relative(np.maximum(np.abs(self.entropy) - self.entropy_rounding, 0), self.entropy_scale)
+        roundings, scales = (self.energy_rounding, self.entropy_rounding), (self.energy_scale, self.entropy_scale)
+        energy, entropy = (
+            np.maximum(worst - rounding, 0) / (scale if scale > 0 else 1.0)
+            for worst, rounding, scale in zip(self._worst, roundings, scales, strict=True)
+        )
         open_balances = (("energy", energy), ("entropy", entropy), ("sites", self.site_error))
         limit = OPEN_BALANCE * max(self.rtol, TIGHTEST_JUDGED)
         found += [
@@ -145,17 +153,13 @@ class Audit:
         return tuple(found)
 
 
-def _relative(residual: Array, scale: Any) -> Any:
-    worst = np.max(np.abs(residual), axis=-1, initial=0.0)
-    return worst / np.where(scale > 0, scale, 1.0)
-
-
-def resolved(residual: Array, scale: Any, stored: Any, rounding: Any) -> Any:
-    """Return the relative residual along the last axis, of one run or of many; if the exchanged amount is lost in the
-    last digits of the stored one, relative to the latter.
+def resolved(worst: Any, scale: Any, stored: Any, rounding: Any) -> Any:
+    """Return the largest residual, of one run or of many, relative to the exchanged amount; if that is lost in the last
+    digits of the stored one, relative to the latter.
     """
-    unresolved = (np.max(np.abs(residual), axis=-1, initial=0.0) <= rounding) & (ROUNDED_PART * scale <= rounding)
-    return _relative(residual, np.where(unresolved, np.maximum(scale, stored), scale))
+    unresolved = (worst <= rounding) & (ROUNDED_PART * scale <= rounding)
+    size = np.where(unresolved, np.maximum(scale, stored), scale)
+    return worst / np.where(size > 0, size, 1.0)
 
 
 def residuals(totals: Sequence[Total], values: Any, ledger: Array) -> list[tuple[Array, Any]]:

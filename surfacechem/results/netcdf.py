@@ -125,8 +125,10 @@ def as_dataset(columns: Sequence[Column], attributes: Mapping[str, str | float |
     data: dict[str, Any] = {}
     coordinates: dict[str, Any] = {}
     indexes: dict[str, Any] = {}
+    sizes: dict[Any, int] = {}
     for c in columns:
         values = np.asarray(c.values)
+        sizes |= zip(c.dimensions, values.shape, strict=True)
         # Checks of an array import Dask and Pint if installed, for a second.
         variable = xarray.Variable(c.dimensions, values, c.attributes, fastpath=True)
         if c.dimensions == (c.name,):
@@ -135,8 +137,7 @@ def as_dataset(columns: Sequence[Column], attributes: Mapping[str, str | float |
         else:
             (coordinates if c.name in said else data)[c.name] = variable
     # The public constructor merges variable by variable, which takes longer than all else: here nothing differs.
-    variables = {**data, **coordinates}
-    return xarray.Dataset._construct_direct(variables, set(coordinates), attrs=attributes, indexes=indexes)
+    return xarray.Dataset._construct_direct({**data, **coordinates}, set(coordinates), sizes, attributes, indexes)
 
 
 def dataset_path(path: str | Path) -> Path:

@@ -32,7 +32,9 @@ def _two_sided(t: Array) -> tuple[Array, Mask]:
     """Return increasing times and the mask of rows to keep. Of rows with one time, the first is moved to just before
     it, and only the first and the last are kept.
     """
-    same = np.diff(t) <= 0
+    same = t[1:] <= t[:-1]
+    if not same.any():
+        return t, np.ones(len(t), bool)
     begins, ends = np.append(True, ~same), np.append(~same, True)
     moved = np.where(begins & ~ends & (t > 0), np.nextafter(t, -1.0), t)
     kept = (begins & (t > 0)) | ends
@@ -52,7 +54,8 @@ def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
     kept[[0, -1]] = True
     scaled = np.divide(values, allowed[:, None], out=np.zeros(values.shape), where=allowed[:, None] > 0)
     ways = np.array([t, np.log(np.maximum(t, t[t > 0].min(initial=1.0)))])
-    kept[1:] |= np.diff(np.floor(np.cumsum(_lines(ways, scaled))), prepend=0.0) > 0
+    lines = np.floor(np.cumsum(_lines(ways, scaled)))
+    kept[1:] |= lines > np.concatenate((np.zeros(1), lines[:-1]))
     rows = np.flatnonzero(~kept)
     while len(rows):
         ends = np.flatnonzero(kept)
@@ -83,8 +86,10 @@ def _lines(ways: Array, values: Array) -> Array:
                 np.abs(np.subtract(slope[:, 1:], slope[:, :-1], out=bends), out=bends)
                 bend = bends.max(axis=0, initial=0.0) / (way[2:] - way[:-2])
                 # A line of this length misses its length squared times bend / 4.
-                density = np.nan_to_num(np.sqrt(3 / 8 * bend), posinf=0.0)
-            found = np.fmax(found, length / 2 * (np.append(density, density[-1]) + np.append(density[0], density)))
+                density = np.sqrt(3 / 8 * bend)
+            density[~np.isfinite(density)] = 0.0
+            ends = np.concatenate((density[:1], density, density[-1:]))
+            found = np.fmax(found, length / 2 * (ends[1:] + ends[:-1]))
     return np.asarray(np.minimum(found, 1.0))
 
 
@@ -170,11 +175,12 @@ def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States
     t, segment, problem = result.times, result.segments_at(result.times, result.segment), result.problem
     lengths = np.diff(t)
     left = np.flatnonzero((lengths > 0) & (np.diff(segment) == 0) & (t[:-1] > 0))
-    right, length, parameters = left + 1, lengths[left], problem.parameters[segment[left]]
+    right, length = left + 1, lengths[left]
     middle = t[left] + length / 2
     # The middle of the cubic Hermite interpolant.
     states = (y[left] + y[right]) / 2 + length[:, None] / 8 * (rates[left] - rates[right])
     if problem.program.algebraic_mask.any():  # quantities may be small differences of algebraic states
+        parameters = problem.parameters[segment[left]]
         states = consistent(problem.program, middle, states, rates[left], parameters).y
     between = trajectory.at(States(middle, states, result.ledger_outputs[left], segment[left]))
     lines = (trajectory.outputs[left] + trajectory.outputs[right]) / 2
@@ -182,16 +188,18 @@ def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States
         apart = np.abs(between.outputs - lines)
     allowed, varies = (each[len(each) - apart.shape[1] :] for each in (resolution.allowed, resolution.varies))
     missed = (apart[:, varies] / allowed[varies]).max(axis=1, initial=0.0)
+    if not np.any(missed > 1):
+        return []
     rows = np.sort(np.argsort(-missed, kind="stable")[:MOST_REFINED])
     rows = rows[missed[rows] > 1]
-    if not len(rows):
-        return []
     bent, parts = left[rows], np.minimum(np.ceil(missed[rows]), PARTS_REFINED).astype(int)
     # No event lies between two outputs.
     arc = replace(problem, record_steps=False, line_error=0.0, max_seconds=None, active=(False,) * len(problem.margins))
     problems = [
         replace(arc, y0=y[i], times=np.linspace(*ends, n + 1)[1:-1], segments=np.array(ends), parameters=p[None])
-        for i, n, p, ends in zip(bent, parts, parameters[rows], zip(t[bent], t[bent + 1], strict=True), strict=True)
+        for i, n, p, ends in zip(
+            bent, parts, problem.parameters[segment[bent]], zip(t[bent], t[bent + 1], strict=True), strict=True
+        )
     ]
     found = solver(trajectory.run.solver).solve_all(problems)
     return [

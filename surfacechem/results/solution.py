@@ -30,9 +30,6 @@ from surfacechem.solve.run import Run, Trajectory
 RECORDED_SETTINGS = ("times", "picture", "atol", "max_steps")
 """Settings of a run that a dataset records if they differ from those of its case; others are attributes."""
 
-REACTION_CLASSES = {"exothermic": 1, "endothermic": -1}
-"""Classes of reactions with the sign of their heat."""
-
 
 @dataclass(frozen=True)
 class Judgement:
@@ -211,8 +208,9 @@ class Solution(Results):
         heat = self.trajectory.everywhere("q_reaction")
         if not len(heat):
             return {}
-        felt = self.trajectory.run.rtol * float(np.max(np.abs(heat), initial=0.0))
-        found = [name for name, sign in REACTION_CLASSES.items() if np.any(sign * heat > felt)]
+        low, high = float(heat.min()), float(heat.max())
+        felt = self.trajectory.run.rtol * max(-low, high)
+        found = [name for name, most in (("exothermic", high), ("endothermic", -low)) if most > felt]
         return {"reaction": " and ".join(found) or "isothermic"}
 
     def _departures(self) -> dict[str, str]:

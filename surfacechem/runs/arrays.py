@@ -484,7 +484,8 @@ class ArrayRuns:
             stored = np.maximum(rounded[:, j] / EPS, np.abs(named[total.variables[0]]).max(axis=1))
             stored = np.maximum(stored, scale) if which == "entropy" else stored
             rounding = EPS * stored * (LAST_DIGITS + batch.counts[:, RECORDS])
-            columns[f"{which}_error"] = resolved(residual, scale, stored, rounding)
+            worst = np.max(np.abs(residual), axis=-1, initial=0.0)
+            columns[f"{which}_error"] = resolved(worst, scale, stored, rounding)
         sites = np.zeros(len(reached))
         for j in system.account_columns.get("bonds", ()):
             bonds = whole(values[system.ledger[j].law])
