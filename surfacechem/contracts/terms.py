@@ -162,7 +162,7 @@ class Law(ABC):
         return {}
 
     @property
-    def limits(self) -> Mapping[str, tuple[float, float]]:
+    def limits(self) -> Mapping[str, tuple[Expression, Expression]]:
         """Ranges of variables outside which the law has no value; a run that reaches their end stops."""
         return {}
 

@@ -249,7 +249,7 @@ class Vogel(Property):
     c: float = parameter("K", "temperature at which it would be infinite", at_least=0, varies=False)
 
     @property
-    def limits(self) -> Mapping[str, tuple[float, float]]:
+    def limits(self) -> Mapping[str, tuple[Expression, Expression]]:
         """The pole of the formula."""
         return {"T_c": (self.c, math.inf)}
 

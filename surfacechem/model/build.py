@@ -448,14 +448,16 @@ class Build:
             reason = f"{name} fell below {least if least != 0 else 'zero'}, {ends}"
             self.margins.append(Margin(f"{name} >= {least}", value - least + slack, reason))
         self._narrow_places(law, own, met)
-        for name, (low, high) in law.limits.items():
+        for name, ends_of in law.limits.items():
             value = self.variables.get(name, law)
-            slack = NO_AMOUNT * max(abs(end) for end in (low, high) if math.isfinite(end))
-            reason = f"{name} left the range of {law.called}, {low:g} to {high:g}"
-            if math.isfinite(low):
-                self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason, domain=True))
-            if math.isfinite(high):
-                self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason, domain=True))
+            low, high = (None if end in (-math.inf, math.inf) else end for end in ends_of)
+            slack = NO_AMOUNT * sum(absolute(end) for end in (low, high) if end is not None)
+            told = [f"{end:g}" if isinstance(end, int | float) else str(end) for end in ends_of]
+            reason = f"{name} left the range of {law.called}, {' to '.join(told)}"
+            if low is not None:
+                self.margins.append(Margin(f"{name} >= {told[0]}", value - low + slack, reason, domain=True))
+            if high is not None:
+                self.margins.append(Margin(f"{name} <= {told[1]}", high + slack - value, reason, domain=True))
 
     def _read(self, law: Law, name: str, own: Mapping[str, Expression]) -> Expression:
         """Return the expression that a law reads by a name: from its own arguments, else from the scene."""

@@ -420,6 +420,16 @@ def test_a_run_that_reaches_the_pole_of_a_viscosity_stops():
     assert "T_c left the range of the law vogel" in trajectory.reason
 
 
+def test_the_pole_of_a_viscosity_is_that_of_the_run():
+    oil, pole = surfacechem.load("lubricated-sliding"), "interface.medium.viscosity.vogel.c"
+    with pytest.raises(InputError, match=r"T_c left the range of the law vogel, c to inf .*-86\.85"):
+        oil.run({pole: 400.0})
+    cold = {"loading.v": 0.0, "surroundings.temperature": 290.0, "initial.T_1": 295.0, "initial.T_2": 295.0}
+    run = oil.run({pole: 300.0, "initial.T_c": 301.0, **cold})
+    assert run.status == "stopped"
+    assert float(run.dataset["T_c"].min()) > 300 - 1e-6
+
+
 # -- nothing without need ---------------------------------------------------------------------------------------------
 
 

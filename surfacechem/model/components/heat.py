@@ -115,7 +115,7 @@ def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power | HeatPath]
     bound = build.variables.bind(law, f"heat.{law.name()}")
     r_1, r, r_2 = build.variables.call(bound, bound.resistances)
     build.law_ranges(law)
-    build.law_margins(law, {})
+    build.law_margins(bound, {})
     scale = r**2 + 4 * r * (r_1 + r_2) + 12 * r_1 * r_2
     beside = -2 * r / scale * (ends[1].T - ends[0].T)
     flows, produced = [], symengine.Integer(0)
@@ -140,7 +140,7 @@ def _paths(build: Build, law: HeatTransfer) -> Iterator[tuple[tuple[str, str], d
     own = {"T_from": nodes[0].T, "T_to": nodes[1].T}
     channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
     build.law_ranges(law)
-    build.law_margins(law, {})
+    build.law_margins(bound, {})
     if law.closure == "medium":
         centre = end_node(build, "interface", law)
         for ends, node in zip(((a, "interface"), ("interface", b)), nodes, strict=True):

@@ -92,7 +92,7 @@ def _given(build: Build, name: str, value: float | Property) -> Expression:
     bound = build.variables.bind(value, f"{path}.{value.name()}")
     expression = build.variables.call(bound, bound.statement)
     build.law_ranges(value)
-    build.law_margins(value, {})
+    build.law_margins(bound, {})
     return build.name(VARIABLES[name], expression)
 
 
