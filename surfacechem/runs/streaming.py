@@ -26,7 +26,7 @@ from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, cannot_jump, is_arra
 from surfacechem.runs.at_rest import NoSteadyStateError, refuse_histories, to_steady_state
 from surfacechem.runs.checking import Checked, checked_arrays
 from surfacechem.runs.keeping import INADMISSIBLE, NO_STEADY_STATE, STATUSES, Columns, Keep, RunByRun, keep_of, variable
-from surfacechem.solve import AUTO
+from surfacechem.solve import AUTO, EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Index
 from surfacechem.solve.lanes import lane_batch
 from surfacechem.solve.run import Model, Run, Trajectory
@@ -72,15 +72,15 @@ class ChunkRuns:
         case = simulation.case
         # If the case names no solver, the one that suits the scene.
         asked = case.run if "run.solver" in case.places else replace(case.run, solver=AUTO)
-        automatic = asked.solver == AUTO
+        self.automatic = asked.solver == AUTO
         chosen = run or self.model.chosen(asked, self.model.values(changes))
         self.run = sweeps.following(self.model, plan, chosen, changes) if keep.series and run is None else chosen
         self.one_by_one = RunByRun(self.model, keep, chosen.steady)
-        arrays = ArrayRuns(self.model, plan, self.run, changes, keep, automatic)
+        arrays = ArrayRuns(self.model, plan, self.run, changes, keep, self.automatic)
         is_vector = is_array(self.model, plan, self.run, arrays.problem)
         self.solvers = [arrays] if is_vector and cannot_jump(self.model, arrays.problem) else []
         if is_vector and self.model.system.edges:
-            self.solvers.append(JumpingRuns(self.model, plan, self.run, changes, keep, automatic))
+            self.solvers.append(JumpingRuns(self.model, plan, self.run, changes, keep, self.automatic))
         """Ways to compute runs as arrays, in the order in which they are tried; the rest is solved run by run."""
         self.arrays = arrays if self.solvers else None
 
@@ -155,11 +155,17 @@ class ChunkRuns:
             runs = sweeps.settings(self.model.system, self.plan, self.run, full)
             if self.run.steady:  # each to its steady state, whatever the other runs are
                 runs = [to_steady_state(self.model, run, at) for run, at in zip(runs, full, strict=True)]
-            return [*self.model.solve_all(list(zip(runs, full, strict=True)))]
+            return [*map(self._sure, self.model.solve_all(list(zip(runs, full, strict=True))))]
         except InputError as error:
             if len(chosen) == 1:
                 return [NO_STEADY_STATE if isinstance(error, NoSteadyStateError) else INADMISSIBLE]
         return [run for i in chosen.tolist() for run in self._solved(values, np.array([i]))]
+
+    def _sure(self, done: Trajectory) -> Trajectory:
+        """Repeat a run by implicit steps where explicit ones, chosen by the values of the case, have failed."""
+        if done.status == "failed" and self.automatic and done.run.solver == EXPLICIT:
+            return self.model.solve_values(replace(done.run, solver=IMPLICIT), done.values)
+        return done
 
 
 def _put(columns: Columns, own: Index, found: Columns, count: int) -> None:

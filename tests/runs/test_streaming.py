@@ -55,6 +55,14 @@ def stored(path, simulation=None, **options):
     return stream.run(options.pop("threads", 1), **options)
 
 
+@pytest.mark.parametrize("balances", ["none", "all"])
+def test_a_run_too_stiff_for_the_method_of_its_case_goes_by_implicit_steps(tmp_path, balances):
+    keep, cold = {"last": ["theta_free_s"], "balances": balances}, "interface.temperature"
+    found = stored(tmp_path / "s.zarr", case("vinculin-catch-bond", keep=keep, over={cold: [298.15, 3.0]})).dataset
+    assert found["status"].values.tolist() == [STATUSES.index("finished")] * 2
+    assert float(found["theta_free_s_last"][1]) == pytest.approx(1.0)  # at 3 K and 8 pN bonds break at once
+
+
 def digest(path):
     files = sorted(file for file in path.rglob("*") if file.is_file())
     return [(str(file.relative_to(path)), hashlib.sha256(file.read_bytes()).hexdigest()) for file in files]
