@@ -455,22 +455,22 @@ _EXP = [1.0 / factorial(k) for k in range(2, 14)]
 
 def exp(builder: Any, x: Any) -> Any:
     """Exponential of a vector: 2^k exp(r) with abs(r) at most half of the logarithm of 2 (Cody & Waite)."""
-    inside = builder.select(builder.fcmp_ordered(">", x, number(_MAX_EXP)), number(_MAX_EXP), x)
-    # The ordered comparison also replaces NaN.
-    inside = builder.select(builder.fcmp_ordered(">=", inside, number(_MIN_EXP)), inside, number(_MIN_EXP))
-    rounded = builder.fadd(builder.fmul(inside, number(1.4426950408889634)), number(_ROUNDING_SHIFT))
+    rounded = by_vector(builder, "fmuladd", x, number(1.4426950408889634), number(_ROUNDING_SHIFT))
     whole = builder.fsub(rounded, number(_ROUNDING_SHIFT))
-    rest = builder.fsub(inside, builder.fmul(whole, number(_LN2_HIGH)))
-    rest = builder.fsub(rest, builder.fmul(whole, number(_LN2_LOW)))
-    series = builder.fmul(builder.fmul(rest, rest), _polynomial(builder, rest, _EXP))
-    found = builder.fadd(number(1.0), builder.fadd(rest, series))
+    rest = by_vector(builder, "fmuladd", whole, number(-_LN2_HIGH), x)
+    rest = by_vector(builder, "fmuladd", whole, number(-_LN2_LOW), rest)
+    series = by_vector(builder, "fmuladd", builder.fmul(rest, rest), _polynomial(builder, rest, _EXP), rest)
     # In two factors, as the power of 2 may lie beyond the range.
     power = builder.sub(builder.bitcast(rounded, INTEGERS), _whole(_bits(_ROUNDING_SHIFT)))
     half = builder.sub(builder.lshr(builder.add(power, _whole(2048)), _whole(1)), _whole(1024))
-    for part in (half, builder.sub(power, half)):
-        bits = builder.shl(builder.add(part, _whole(1023)), _whole(52))
-        found = builder.fmul(found, builder.bitcast(bits, VECTOR))
+    first, second = (
+        builder.bitcast(builder.shl(builder.add(part, _whole(1023)), _whole(52)), VECTOR)
+        for part in (half, builder.sub(power, half))
+    )
+    found = builder.fmul(by_vector(builder, "fmuladd", series, first, first), second)
     found = builder.select(builder.fcmp_ordered(">", x, number(_MAX_EXP)), number(np.inf), found)
+    # Here rather than before: what follows from the argument would have to wait for it.
+    found = builder.select(builder.fcmp_ordered("<", x, number(_MIN_EXP)), number(0.0), found)
     return builder.select(builder.fcmp_unordered("uno", x, x), x, found)
 
 
