@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Self
+from functools import wraps
+from typing import Any, Self, TypeVar, cast
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 LINES, NEAR = 240, 6
 """Total length of names [characters] up to which a message lists all, some two lines; and the number of nearest ones
@@ -71,6 +74,19 @@ def placed(place: Place) -> Iterator[None]:
         yield
     except InputError as error:
         raise error.at(place) from None
+
+
+def concise(entry: F) -> F:
+    """Decorate a function that users call: the traceback of an input error ends at their call, not at our insides."""
+
+    @wraps(entry)
+    def called(*arguments: Any, **options: Any) -> Any:
+        try:
+            return entry(*arguments, **options)
+        except InputError as error:
+            raise error.with_traceback(None)  # noqa: B904 - the same error, with the cause that it has
+
+    return cast(F, called)
 
 
 class OutputError(PlacedError):

@@ -107,6 +107,9 @@ LEAST_COVERAGE = 1e-280
 four decades.
 """
 
+REPULSION_WALL = 0.01
+"""Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, continues as a parabola."""
+
 LARGEST_COVERAGE = 1 - 1e-15
 """Value of a full coverage, for the logarithm of the rest: four EPS from one."""
 

@@ -396,7 +396,8 @@ def plot(
         ),
     ],
     output: Annotated[
-        Path | None, written_to(".png, .svg or .pdf; default <name>.png, for several comparison.png.")
+        Path | None,
+        written_to(".png, .svg or .pdf; default <name>.png, of a store <name>-sweep.png, of several comparison.png."),
     ] = None,
     variables: Annotated[str | None, Option("--variables", help="Variables to plot, separated by commas.")] = None,
     against: Annotated[
@@ -414,7 +415,10 @@ def plot(
     cases = [source for source in sources if not source.rstrip("/").endswith((*RUN_SUFFIXES, ".zarr"))]
     if changes and not cases:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
-    target = output or Path("comparison.png" if len(sources) > 1 else f"{Path(sources[0]).stem}.png")
+    # A store and a run of one name have a figure each.
+    stem, of_store = Path(sources[0]).stem, sources[0].rstrip("/").endswith(".zarr")
+    own = f"{stem.removesuffix('-sweep')}-sweep.png" if of_store else f"{stem}.png"
+    target = output or Path("comparison.png" if len(sources) > 1 else own)
     check_picture(target)
     for source in set(sources) - set(cases):
         begin_reading(Path(source))

@@ -1,6 +1,7 @@
 """Terminal output: sheets with colours and fitting columns, and progress bars after two seconds.
 
-Files and pipes get plain text and no bars. Rich is imported only when a terminal shows something.
+Files and pipes get plain text, and a line of progress now and then. Rich is imported only when a terminal shows
+something.
 """
 
 from __future__ import annotations
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 BAR_DELAY = 2.0
 """Seconds after which a progress bar appears."""
+
+LINE_EVERY = 30.0
+"""Seconds after which a file or a log gets another line of progress: a choice, ten lines in five minutes."""
 
 COLOURS = {"finished": "green", "stopped": "yellow", "failed": "red", "warning": "yellow", "refused": "yellow"}
 """Colours of labels; others are cyan."""
@@ -116,14 +120,15 @@ def _grid(rows: Iterable[Sequence[Text]], indent: int) -> RenderableType:
 
 
 class ProgressBar(logging.Handler):
-    """Progress bar of a command, from the numbers ``done`` and ``total`` of the package's log messages; only on a
-    terminal, and after some time.
+    """Progress of a command, from the numbers ``done`` and ``total`` of the package's log messages: after some time a
+    bar on a terminal, elsewhere a line now and then.
     """
 
     def __init__(self, talk: bool | None) -> None:
         super().__init__(logging.INFO)
-        self.wanted, self.verbose = talk is None and is_terminal(sys.stderr), talk is True
+        self.wanted, self.verbose = talk is None, talk is True
         self.begun = time.monotonic()
+        self.due = BAR_DELAY if is_terminal(sys.stderr) else LINE_EVERY
         self.words, self.done, self.total = "", 0, 0
         self.shown: Any = None
 
@@ -131,16 +136,22 @@ class ProgressBar(logging.Handler):
         """Set the current activity and its progress; nothing is drawn before :meth:`tick`."""
         self.words, self.done, self.total = words, done, total
         if self.verbose:
-            counted = f" ({done}/{total})" if total else ""
-            typer.echo(f"{time.monotonic() - self.begun:8.2f} s  {words}{counted}", err=True)
+            self._line()
+
+    def _line(self) -> None:
+        counted = f" ({self.done}/{self.total})" if self.total else ""
+        typer.echo(f"{time.monotonic() - self.begun:8.2f} s  {self.words}{counted}", err=True)
 
     def emit(self, record: logging.LogRecord) -> None:
         self.tell(record.getMessage(), getattr(record, "done", 0), getattr(record, "total", 0))
 
     def tick(self) -> None:
         """Draw the last progress."""
-        if not self.wanted or time.monotonic() - self.begun < BAR_DELAY:
+        if not self.wanted or time.monotonic() - self.begun < self.due:
             return
+        if not is_terminal(sys.stderr):
+            self.due += LINE_EVERY
+            return self._line()
         # Rich is imported only now, so that brief commands do not wait for it.
         if self.shown is None:
             from rich.console import Console

@@ -23,19 +23,22 @@ import symengine
 import sympy  # type: ignore[import-untyped]
 
 from surfacechem.compile.printing import LATEX_ESCAPES, RELATIONS, Latex, quantities_read, symbol, sympy_form
+from surfacechem.contracts.units import ELECTRON_VOLT
 from surfacechem.expressions import EXPONENT_CAP, LARGE_EXPONENT, LITERAL, Expression, derivative
 from surfacechem.model.system import Named, System
 from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEFAN_BOLTZMANN
-from surfacechem.tolerances import EQUAL, FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE, TINY
+from surfacechem.tolerances import EQUAL, FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE, REPULSION_WALL, TIME_EPS, TINY
 
 EXPONENT_CAPS = (EXPONENT_CAP, LARGE_EXPONENT, LITERAL, -30.0)
 """Exponents up to which a formula is valid without its guard."""
 
-FLOORS = (FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE)
-"""Amounts above which a formula is valid without its guard."""
+FLOORS = (FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE, REPULSION_WALL)
+"""Amounts, and the part of a range, above which a formula is valid without its guard."""
 
-OFF_ZERO = (TINY, TINY**0.5)
-"""Numbers that, added, keep a divisor or the base of a power off zero; the second one where it is squared."""
+OFF_ZERO = (TINY, TINY**0.5, TIME_EPS**2)
+"""Numbers that, added or as a factor of what is added, keep a divisor or the base of a power off zero: the second one
+where it is squared, the third one the square of a speed that no time resolves.
+"""
 
 K_B, R, N_A = map(symengine.Symbol, ("Boltzmann constant", "gas constant", "Avogadro constant"))
 
@@ -43,6 +46,7 @@ CONSTANTS = {
     K_B: (BOLTZMANN, r"k_{\mathrm{B}}"),
     R: (GAS_CONSTANT, "R"),
     N_A: (AVOGADRO, r"N_{\mathrm{A}}"),
+    symengine.Symbol("elementary charge"): (float(ELECTRON_VOLT), "e"),
     symengine.Symbol("Stefan-Boltzmann constant"): (STEFAN_BOLTZMANN, r"\sigma_{\mathrm{SB}}"),
     symengine.pi: (math.pi, ""),
     symengine.sqrt(2 * symengine.pi): (math.sqrt(2 * math.pi), ""),
@@ -169,7 +173,11 @@ def readable(expression: Expression) -> Expression:
     if not whole.args:
         return whole
     make = type(whole) if isinstance(whole, RELATIONS) else whole.func
-    return make(*map(readable, whole.args))
+    found = make(*map(readable, whole.args))
+    if isinstance(found, symengine.Mul) and float(found.args[0] if found.args[0].is_Number else 1) in OFF_ZERO:
+        return symengine.Integer(0)
+    is_magnitude = found.is_Pow and found.args[1] == HALF and found.args[0].is_Pow and found.args[0].args[1] == 2
+    return symengine.Abs(found.args[0].args[0]) if is_magnitude else found
 
 
 def _constant(value: float) -> Expression:
@@ -369,6 +377,12 @@ class PaperPrinter(Latex):
             return rf"\frac{{\mathrm{{d}} {latex}}}{{\mathrm{{d}} t}}"
         accent, base = (r"\ddot", base[5:]) if base.startswith(r"\dot ") else (r"\dot", base)
         return rf"{accent}{{{base}}}{line}{index}"
+
+    def _print_Abs(self, expression: Any, exp: Any = None) -> str:
+        inside = expression.args[0]
+        # The symbol of a magnitude has its bars.
+        plain = str(super()._print_Abs(expression)) if "|" not in self._print(inside) else self._print(inside)
+        return plain if exp is None else f"{plain}^{{{exp}}}"
 
     def _print_Float(self, expression: Any) -> str:
         return str(super()._print_Float(sympy.Float(f"{float(expression):.4g}")))

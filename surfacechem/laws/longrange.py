@@ -19,9 +19,7 @@ from typing import ClassVar
 from surfacechem.contracts.terms import PairEnergy, Potential, option, parameter
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, is_symbolic, log, monotone_cubics, positive, where
-
-REPULSION_WALL = 0.01
-"""Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, continues as a parabola."""
+from surfacechem.tolerances import REPULSION_WALL
 
 CONTACT_DISTANCE = 1.65e-10
 """Distance [m] of surfaces in contact that gives measured surface energies (Israelachvili 2011, ch. 13)."""

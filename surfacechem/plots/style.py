@@ -68,9 +68,6 @@ NOTE_STYLE: Any = {"fontsize": 8, "color": "#555555"}
 LETTERS_PER_INCH, TITLE_PER_INCH = 16, 9.5
 """Letters per inch: of the notes above the panels, and of the title and the labels of axes."""
 
-READABLE_SIZES = (1e-2, 1e4)
-"""Range of numbers that are readable without counting zeros."""
-
 POWERS = (-4, 5)
 """Range of the exponent of the largest value of an axis in which its ticks need no power of ten."""
 
@@ -469,17 +466,18 @@ def parameter_name(name: str) -> str:
 
 
 def value_label(values: xarray.DataArray, place: int) -> str:
-    """Label a value of a swept parameter with name and unit, in the prefix of all values if it is readable in that.
+    """Label a value of a swept parameter with name and unit, in the prefix of all values.
 
     >>> rates = xarray.DataArray([0, -1e-10, 2e-9], name="rate", attrs={"units": "N s-1"})
     >>> [value_label(rates, k) for k in range(3)]
     ['rate = 0 pN s⁻¹', 'rate = −100 pN s⁻¹', 'rate = 2000 pN s⁻¹']
+    >>> value_label(xarray.DataArray([1e-13, 1e-7], name="rate", attrs=rates.attrs), 1)
+    'rate = 10⁵ pN s⁻¹'
     """
-    value = values.values[place]
     text, size = prefixed(unit(values), _middle_of_decades(values.values))
-    if value and not READABLE_SIZES[0] <= np.abs(value) / size < READABLE_SIZES[1]:
-        text, size = prefixed(unit(values), values.values[place : place + 1])
-    return minus(f"{parameter_name(str(values.name))} = {value / size:.4g} {'' if text == '1' else text}".rstrip())
+    digits, _, power = f"{values.values[place] / size:.4g}".partition("e")
+    value = raised(f"{digits}·10^{int(power)}").removeprefix("1·") if power else digits
+    return minus(f"{parameter_name(str(values.name))} = {value} {'' if text == '1' else text}".rstrip())
 
 
 def minus(text: str) -> str:
@@ -553,9 +551,9 @@ def label_variable(axis: XAxis | YAxis, values: xarray.DataArray) -> None:
     label(axis, variable_words(values), unit(values), values.values)
 
 
-def varies(values: Array) -> bool:
-    """True for a curve that is not constant up to rounding."""
+def varies(values: Array, size: float = 0.0) -> bool:
+    """True for a curve that is not constant up to rounding, of itself and of a ``size``."""
     finite = values[np.isfinite(values)]
     if len(finite) < 2:
         return len(finite) == 1
-    return bool(np.ptp(finite) > FLAT * np.max(np.abs(finite), initial=0.0))
+    return bool(np.ptp(finite) > FLAT * np.max(np.abs(finite), initial=size))

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.format.plans import RUN_DIMENSION, STATISTICS, Plan, name_parts, recorded_plan
 from surfacechem.plots import style
-from surfacechem.plots.style import COLOURS, MOST_CURVES, Array, symbol, unit, unit_text, varies
+from surfacechem.plots.style import COLOURS, MOST_CURVES, Array, symbol, unit, varies
 from surfacechem.plots.time_series import PANELS, Panel, of_kind, wants_log_axis
 
 MOST_MEMBERS = 100
@@ -34,7 +34,11 @@ NAME_ORDER = (
     *(r"lifetime", r"(phi|theta).*_last", r"T.*_max", r"(phi|T).*(?<!_m..)"),
     *(r"time_to.*", r"time.*", r".*(?<!_m..)", r".*"),
 )
-"""Order of variables: lifetimes, bonds at the end, largest temperatures, other final values, other extremes."""
+"""Order of variables: lifetimes, bonds at the end, largest temperatures, their other values; times to values, of
+events; other final values, other extremes.
+"""
+TELLING = (NAME_ORDER[:-2], NAME_ORDER[:-1], NAME_ORDER)
+"""What is drawn: bonds, temperatures and times, else other final values, else any."""
 
 BINS, PARAMETER_BINS = 40, 12
 """Numbers of bins of a distribution, and of bins of a parameter in an effect plot."""
@@ -74,12 +78,14 @@ def number_names(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
 
 
 def varying_numbers(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:
-    """Return the numbers that differ between runs: of bonds and temperatures, else of events."""
+    """Return the numbers that differ between runs: of bonds, temperatures and times, else others."""
     found = sorted(known, key=lambda name: next(k for k, rank in enumerate(NAME_ORDER) if re.fullmatch(rank, name)))
     ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
-    shown = _distinct(dataset, [name for name in ends if varies(subsample(dataset, name))])
-    telling = [name for name in shown if any(re.fullmatch(rank, name) for rank in NAME_ORDER[:-1])]
-    return (telling or shown or ["time_reached"])[:MOST_PANELS]
+    # Fractions, of bonds say, are compared with one: those left of broken bonds are rounding.
+    sizes = {name: float(unit(dataset[name]) == "1") for name in ends}
+    shown = _distinct(dataset, [name for name in ends if varies(subsample(dataset, name), sizes[name])])
+    groups = ([name for name in shown if any(re.fullmatch(rank, name) for rank in ranks)] for ranks in TELLING)
+    return next(filter(None, groups), ["time_reached"])[:MOST_PANELS]
 
 
 def _distinct(dataset: xarray.Dataset, names: Sequence[str]) -> list[str]:
@@ -129,11 +135,6 @@ def subsample(dataset: xarray.Dataset, name: str) -> Array:
     return np.asarray(values[:: -(-values.size // MOST_POINTS)], dtype=float)
 
 
-def quantity_label(values: xarray.DataArray) -> str:
-    """Return symbol or words for a variable, and its unit."""
-    return f"{style.quantity_words(values)} [{unit_text(unit(values))}]"
-
-
 def heat_maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
     """Draw colours over two parameters, one map per variable; white where a run has no value."""
     x, y = (dataset[name] for name in axes)
@@ -141,7 +142,8 @@ def heat_maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: S
         for ax, name in zip(grid[:, 0], names, strict=True):
             values = np.ma.masked_invalid(final_values(dataset, name))
             image = ax.pcolormesh(x.values, y.values, values.T, shading="nearest", cmap="viridis", rasterized=True)
-            plot.colorbar(image, ax=ax, label=quantity_label(dataset[name]))
+            bar = plot.colorbar(image, ax=ax)
+            style.label(bar.ax.yaxis, style.quantity_words(dataset[name]), unit(dataset[name]), values.compressed())
             style.draw_parameter(ax.yaxis, y, plan.axes[1].logarithmic)
         style.draw_parameter(grid[-1, 0].xaxis, x, plan.axes[0].logarithmic)
         style.headings(plot, grid[0, 0], dataset)
@@ -243,7 +245,7 @@ def effects(
             whole = dataset[name]
             values = subsample(dataset, name)
             distribution(row[0], values)
-            row[0].set_ylabel(quantity_label(whole))
+            style.label(row[0].yaxis, style.quantity_words(whole), unit(whole), values)
             for ax, parameter in zip(row[1:], parameters, strict=True):
                 over = dataset[parameter].broadcast_like(whole).transpose(*axes).values.ravel()
                 effect(ax, over[:: -(-over.size // MOST_POINTS)], values)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from surfacechem import format as cases
 from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import parse
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, concise
 from surfacechem.format import Case
 from surfacechem.reactor.coupling import BodyPort, HeatWall, Receiver, function_of, node_of, refuse, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError, History
@@ -65,6 +65,7 @@ class InterfaceReactor(StateVectorReactor):
         "energy_enabled": (True, "Hold temperatures in the case: `bodies: {lower: {temperature: 300 K}}`."),
     }
 
+    @concise
     def __new__(
         cls,
         case: str | Path | Case | Simulation,
@@ -81,6 +82,7 @@ class InterfaceReactor(StateVectorReactor):
         made.scene = scene
         return made
 
+    @concise
     def __init__(
         self,
         case: str | Path | Case | Simulation,

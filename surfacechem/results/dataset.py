@@ -100,7 +100,7 @@ def coverage_columns(system: System, columns: Iterable[Column]) -> list[Column]:
     names, first = np.array([species[name] for name in found], dtype=object), next(iter(found.values()))
     values = np.stack([np.asarray(column.values) for column in found.values()], axis=-1)
     return [
-        Column("species", ("species",), names, "1", "species of the surface"),
+        Column("species", ("species",), names, "", "species of the surface"),
         Column("coverage", (*first.dimensions, "species"), values, "1", "coverage of each species"),
     ]
 

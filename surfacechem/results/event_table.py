@@ -89,8 +89,8 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
         return []
     columns = [
         column("event_time", "s", "time of the event", attrgetter("t")),
-        column("event_name", "1", "name of the event", attrgetter("name"), ""),
-        column("event_reason", "1", "what happened", attrgetter("reason"), ""),
+        column("event_name", "", "name of the event", attrgetter("name"), ""),
+        column("event_reason", "", "what happened", attrgetter("reason"), ""),
     ]
     if not any(run.jumps for run in runs):
         return columns
@@ -99,7 +99,7 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
         column("event_since", "s", "time since the transition before or the start", attrgetter("since")),
         column("event_released", "J/m^2", "energy turned into heat", attrgetter("released")),
         column("event_entropy", "J/(m^2 K)", "entropy produced", attrgetter("entropy")),
-        column("event_verdict", "1", verdict, attrgetter("verdict"), ""),
+        column("event_verdict", "", verdict, attrgetter("verdict"), ""),
     ]
     for name, state in system.own_states.items():
         q, k = state.quantity, system.state_columns[name]

@@ -81,8 +81,9 @@ class Column(NamedTuple):
 
     @property
     def attributes(self) -> dict[str, str | float]:
-        """CF attributes, the number of the equation, and the error."""
-        result = {"units": cf_unit(self.unit), "long_name": self.long_name}
+        """CF attributes, the number of the equation, and the error; a text has no unit, ""."""
+        result = {"units": cf_unit(self.unit)} if self.unit else {}
+        result["long_name"] = self.long_name
         told = {} if self.error is None else {"error": self.error}
         return result | ({"equation": self.tag} if self.tag else {}) | told
 

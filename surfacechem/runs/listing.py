@@ -56,10 +56,15 @@ def counted(count: int, what: str) -> str:
     return f"{count} {what}{'s' if count != 1 else ''}"
 
 
+ALIGNED = 72
+"""Letters up to which a cell takes part in the alignment of its column."""
+
+
 def columns(rows: Iterable[Sequence[str]]) -> list[str]:
-    """Format rows as text in aligned columns."""
+    """Format rows as text in aligned columns; what is beside a long cell begins after it."""
     table = [list(row) for row in rows]
-    widths = [max(len(cell) for cell in column) for column in zip(*table, strict=True)]
+    sizes = [[len(cell) for cell in column if len(cell) <= ALIGNED] for column in zip(*table, strict=True)]
+    widths = [max(column, default=0) for column in sizes]
     return ["  ".join(f"{cell:<{w}}" for cell, w in zip(row, widths, strict=True)).rstrip() for row in table]
 
 

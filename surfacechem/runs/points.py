@@ -74,7 +74,7 @@ class PointResults(Results):
         found += [*self.values, *self.slopes, Column("admissible", POINT, allowed, "1", "one where all laws hold")]
         if any(self.refused):
             why = np.array(self.refused, dtype=object)
-            found.append(Column("reason", POINT, why, "1", "why a law does not hold"))
+            found.append(Column("reason", POINT, why, "", "why a law does not hold"))
         return found
 
     @property

@@ -16,7 +16,7 @@ from surfacechem import format as cases
 from surfacechem.contracts.units import parse
 from surfacechem.documents.document import OVERRIDE, assignments, from_plain, overridden, parameter_path
 from surfacechem.documents.document import parse as parse_document
-from surfacechem.errors import PATHS, InputError, Place, suggestion
+from surfacechem.errors import PATHS, InputError, Place, concise, suggestion
 from surfacechem.format import Case, Overrides, Source
 from surfacechem.model.assemble import perturbed
 from surfacechem.model.system import System
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from surfacechem.runs.sweeps import SweepSolution
 
 
+@concise
 def load(source: Source, overrides: Overrides = ()) -> Simulation:
     """Read and check a case; it is assembled and compiled when first needed.
 
@@ -70,6 +71,7 @@ def load(source: Source, overrides: Overrides = ()) -> Simulation:
     return Simulation(cases.load(source, overrides))
 
 
+@concise
 def run(source: Source, overrides: Overrides = ()) -> Solution:
     """Read a case and run it.
 
@@ -91,6 +93,7 @@ def run(source: Source, overrides: Overrides = ()) -> Solution:
     return load(source, overrides).run()
 
 
+@concise
 def sweep(
     source: Source,
     over: Mapping[str, object] | None = None,
@@ -199,6 +202,7 @@ class Simulation:
         except InputError as error:
             raise self.case.located(error) from None
 
+    @concise
     def evaluate(self, points: Points | None = None) -> xarray.Dataset:
         """Quantities of the scene at given states, and their exact derivatives, without a run.
 
@@ -229,6 +233,7 @@ class Simulation:
 
         return evaluation(self.evaluator, {} if points is None else points, **self._origin({}))
 
+    @concise
     def run(self, changes: Overrides | None = None, run: Run | None = None, error: str = "auto") -> Solution:
         """Run with some parameters or initial values changed; nothing is compiled again.
 
@@ -422,6 +427,7 @@ class Simulation:
         values = {path: value for path, value in trajectory.values.items() if path in self._units}
         return self._solved(trajectory.run, values)[0]
 
+    @concise
     def sweep(
         self,
         over: Mapping[str, object] | None = None,
@@ -496,6 +502,7 @@ class Simulation:
         judge = None if unchecked else partial(sweeps.accuracy, chosen.case, threads=threads, cells=added)
         return sweeps.SweepSolution(model, plan, taken, done, judge, **chosen._origin(values))
 
+    @concise
     def stream(
         self,
         plan: Plan,
@@ -545,6 +552,7 @@ class Simulation:
         except InputError as error:
             raise self.case.located(plan.located(error)) from None
 
+    @concise
     def plan(
         self,
         over: Mapping[str, object] | None = None,

@@ -245,20 +245,23 @@ class Stream:
             runs, resumed = layout.runs_of(numbers), layout.runs_of(set(numbers) - set(missing))
             done, failed = resumed, 0
             on_progress(Progress(runs, done, failed, resumed))
-            for number, columns in self._computed(missing, threads or processors(), client):
+            for number, futures in self._computed(missing, threads or processors(), client):
+                parts = []
+                for future in futures:
+                    parts.append(columns := future.result())
+                    done += len(columns["status"])
+                    failed += int(np.sum(columns["status"] >= STATUSES.index("failed")))
+                    on_progress(Progress(runs, done, failed, resumed))
                 # Only this thread writes, so that chunks and their marks are written in order.
-                self.store.write(number, columns)
-                done += len(columns["status"])
-                failed += int(np.sum(columns["status"] >= STATUSES.index("failed")))
-                on_progress(Progress(runs, done, failed, resumed))
+                self.store.write(number, {name: np.concatenate([each[name] for each in parts]) for name in parts[0]})
         return self.store
 
     def check(self, threads: int | None = None) -> Checked | None:
         """Find and store the errors of the checked runs, once every chunk is there; None before."""
         return checking.check(self, threads)
 
-    def _computed(self, numbers: Sequence[int], threads: int, client: Any) -> Iterator[tuple[int, Columns]]:
-        """Yield the columns of chunks in order; the next chunks are computed while one is written."""
+    def _computed(self, numbers: Sequence[int], threads: int, client: Any) -> Iterator[tuple[int, list[Any]]]:
+        """Yield the futures of the columns of the parts of chunks, in order; the next chunks are computed meanwhile."""
         pool = ThreadPoolExecutor(threads)
 
         def submit(part: Index) -> Any:
@@ -277,19 +280,14 @@ class Stream:
                 parts = [index[first : first + size] for first in range(0, len(index), size)]
                 waiting.append((number, [submit(part) for part in parts]))
                 if len(waiting) > ahead:
-                    yield _joined(*waiting.popleft())
+                    yield waiting.popleft()
             while waiting:
-                yield _joined(*waiting.popleft())
+                yield waiting.popleft()
         finally:
             # If writing has failed, nothing more is computed in vain.
             for future in (future for _, futures in waiting for future in futures):
                 future.cancel()
             pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _joined(number: int, futures: Sequence[Any]) -> tuple[int, Columns]:
-    found = [future.result() for future in futures]
-    return number, {name: np.concatenate([columns[name] for columns in found]) for name in found[0]}
 
 
 def failed_runs(path: Path, status: str) -> Plan:

@@ -59,7 +59,7 @@ MOST_FOLLOWED = 64
 MOST_OUTPUTS = 128_000
 """Outputs of all runs of a sweep together, if they need more than the evenly spaced times."""
 
-RUNS_AT_A_TIME = 256
+RUNS_AT_A_TIME = 64
 """Runs that are solved at a time; progress is reported between portions."""
 
 log = logging.getLogger(__name__)
@@ -526,8 +526,9 @@ class SweepSolution(Results):
 
     def _of_each(self, name: str, values: Sequence[Any] | NDArray[np.float64], unit: str, text: str) -> Column:
         """Return a column with one value per run."""
-        shaped = np.array(values, object if isinstance(values[0], str) else float).reshape(self.plan.shape)
-        return Column(name, tuple(self.axes), shaped, self.system.unit(unit), text)
+        is_text = isinstance(values[0], str)
+        shaped = np.array(values, object if is_text else float).reshape(self.plan.shape)
+        return Column(name, tuple(self.axes), shaped, "" if is_text else self.system.unit(unit), text)
 
     @cached_property
     def attributes(self) -> dict[str, str | float | int]:

@@ -310,9 +310,9 @@ class Study:
         found = []
         for name, over, read, unit, text in self.variables:
             values = [read(*place) for place in product(*(self.axes[axis] for axis in over))]
-            kind = object if isinstance(values[0], str) else float
-            table = np.array(values, dtype=kind).reshape([len(self.axes[axis]) for axis in over])
-            found.append(Column(name, over, table, unit, text))
+            is_text = isinstance(values[0], str)
+            table = np.array(values, object if is_text else float).reshape([len(self.axes[axis]) for axis in over])
+            found.append(Column(name, over, table, "" if is_text else unit, text))
         return tuple(found)
 
     @cached_property

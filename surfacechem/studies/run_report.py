@@ -183,12 +183,16 @@ def _numbers(system: System, symbols: Mapping[str, str], attributes: Mapping[str
 
 
 def equation_sheet(system: System, title: str) -> Sheet:
-    """Return the equations as text for a terminal, each with its meaning and the modes in which it holds."""
+    """Return the equations as text for a terminal, each with its meaning and the modes in which it holds.
+
+    What is compiled is guarded besides; one line says so.
+    """
     rows = [
         (plain(" ".join((line.left, *line.pieces))), "; ".join(filter(None, (line.text, line.when))))
         for line in equations(system)[0]
     ]
-    return Sheet(f"{title}: {system.regime}", tables={"": rows})
+    left_out = "guards against overflow, division by zero and what no time resolves; `--format python` has them"
+    return Sheet(f"{title}: {system.regime}", [("left out", left_out)], {"": rows})
 
 
 def _stated(law: type[Law]) -> Iterator[Equation]:

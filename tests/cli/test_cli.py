@@ -369,6 +369,15 @@ class TestPlot:
         assert content.startswith(b"\x89PNG")
         assert len(content) > 10_000
 
+    def test_of_a_store_leaves_that_of_a_run_of_its_name(self, call, tmp_path):
+        over = ["--over", "initial.T=[300, 310]", "--set", "sweep.checked=0"]
+        assert call("sweep", "bonding.yaml", "-o", "bonding.zarr", "-q", *over).exit_code == 0
+        assert [call("plot", name).stdout for name in ("bonding.yaml", "bonding.zarr")] == [
+            "bonding.png\n",
+            "bonding-sweep.png\n",
+        ]
+        assert {name for name in files(tmp_path) if name.endswith("png")} == {"bonding.png", "bonding-sweep.png"}
+
     def test_of_a_case_ends_like_the_run(self, call, tmp_path):
         assert call("plot", "cooling.yaml", "--set", "run.outputs=9", "--variables", "T").exit_code == 3
         assert files(tmp_path) == {"cooling.png"}

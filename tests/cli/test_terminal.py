@@ -64,6 +64,18 @@ def test_a_bar_shows_what_is_logged_after_a_while(monkeypatch):
     assert logging.getLogger("surfacechem").handlers == []
 
 
+def test_a_log_gets_a_line_now_and_then(monkeypatch, capsys):
+    """Where a sweep takes minutes and nothing is a terminal."""
+    log = logging.getLogger("surfacechem.runs.sweeps")
+    monkeypatch.setattr(terminal, "LINE_EVERY", 0.0)
+    for talk in (None, False):
+        with terminal.progress_bar(talk) as bar:
+            bar.due = -1.0  # of the past
+            log.info("runs", extra={"done": 3, "total": 12})
+            bar.tick()
+    assert re.fullmatch(r" +0\.\d\d s  runs \(3/12\)\n", capsys.readouterr().err)
+
+
 def test_a_study_has_tables_in_which_failures_stand_out(monkeypatch):
     streams = on_terminal(monkeypatch)
     table = PageTable(("solver", "verdict"), [("radau", "right"), ("other", "wrong " * 12)], "Verdicts", marked=[1])

@@ -93,8 +93,21 @@ def test_the_fall_of_friction_has_no_guard_at_rest():
 
 
 def test_a_turn_of_sliding_has_no_guard_at_rest():
-    turn = next(line for line in as_text(load("anisotropic-slide").system) if line.startswith("0 = dα/dt"))
-    assert "10^-146" not in turn
+    """Nor of its speed, by what no time resolves; the symbol of a magnitude has its bars already."""
+    for name in ("anisotropic-slide", "pulled-at-an-angle"):
+        (turn,) = (line for line in as_text(load(name).system) if line.startswith("dα/dt |v|"))
+        assert turn.startswith("dα/dt |v| = 1/m_t (")
+        assert "10^" not in turn
+
+
+def test_a_range_of_gaps_in_which_a_law_is_continued_is_no_part_of_it():
+    approach = as_text(load("snap-in").system)[0]
+    assert "(g_0^6/g_n^6 - 5))/(5 g_n^4) + k_n" in approach
+    assert "for" not in approach
+
+
+def test_a_charge_is_printed_by_the_name_of_the_constant():
+    assert "i_electron = R_R1 e" in as_text(load("lithium-charging").system)
 
 
 def test_choices_and_functions_are_text_without_words_of_latex():

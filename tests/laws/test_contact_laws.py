@@ -18,10 +18,11 @@ from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.free_energy import Quadratic
 from surfacechem.laws.friction import Coulomb, Stribeck
 from surfacechem.laws.loading import Hold
-from surfacechem.laws.longrange import REPULSION_WALL, LennardJonesFlatFlat, VanDerWaalsSpherePlane
+from surfacechem.laws.longrange import LennardJonesFlatFlat, VanDerWaalsSpherePlane
 from surfacechem.model.assemble import assemble
 from surfacechem.runs.listing import law_table
 from surfacechem.scene import Body, Interface, Scene
+from surfacechem.tolerances import REPULSION_WALL
 
 GAPS = [law for law in laws(Potential).values() if {"g_n", "g_t"} & set(reads(law.energy))]
 each_gap_law = pytest.mark.parametrize("law", GAPS, ids=lambda law: law.name())

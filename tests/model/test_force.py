@@ -11,16 +11,16 @@ from solved import solve
 from surfacechem.contracts.terms import Varying
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
 from surfacechem.laws.factors import Linear
-from surfacechem.laws.free_energy import BondEnergy, NormalStiffness, Penalty
+from surfacechem.laws.free_energy import BondEnergy, LatticeGas, NormalStiffness, Penalty
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck
 from surfacechem.laws.heat_transfer import PressureConductance
-from surfacechem.laws.kinetics import LinearAffinity
+from surfacechem.laws.kinetics import Bell, LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.laws.longrange import ElectrostaticFlatFlat, LennardJonesFlatFlat, VanDerWaalsFlatFlat
 from surfacechem.model.assemble import assemble
 from surfacechem.results.solution import Solution
 from surfacechem.runs.check import start_warnings
-from surfacechem.scene import Interface, Mounting, Scene
+from surfacechem.scene import Body, Interface, Mounting, Scene, Sites
 from surfacechem.solve.run import Model, Run
 
 A_H, D_0, E_N = 6.5e-20, 1e-9, 1e18
@@ -141,6 +141,20 @@ def test_a_limit_that_falls_as_the_interface_heats_is_told_by_the_run():
     hot = replace(made, loading=made.loading | {"Q_1": Hold(level=1e5)})
     assert not told_by_check(hot)
     assert "is below its sliding friction" in " ".join(Solution(solve(hot, 1.0)).warnings)
+
+
+def test_rates_under_a_force_that_they_do_not_feel_are_told():
+    law, kept = Bell(k_off=1.0), Hold(level=300.0)
+    made = Scene(
+        (Body("lower", kept), Body("upper", kept)),
+        Interface(kept, [LatticeGas(epsilon=0.0)], reactions=[law], sites=Sites(1e16, 1e16)),
+        loading={"f": Hold(level=1e-11)},
+        initial={"phi": 0.5},
+    )
+    (text,) = assemble(made).warnings
+    assert text == "bell reads the force on bonds, but does not depend on it: without a value are x_off, k_on, x_on."
+    felt = Interface(kept, made.interface.potentials, reactions=[replace(law, x_off=4e-10)], sites=made.interface.sites)
+    assert not assemble(replace(made, interface=felt)).warnings
 
 
 # -- bonds across an open gap --------------------------------------------------------------------------------------

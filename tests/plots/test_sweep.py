@@ -48,6 +48,23 @@ def test_a_map_over_two_parameters(tmp_path):
     assert words == [f"{BOND_ENERGY} [J m⁻²]", "Initial temperature of lower and upper and interface [K]"]
 
 
+def test_a_store_shows_bonds_temperatures_and_times_before_all_else(tmp_path):
+    over = {K_0: [100.0, 200.0], "initial.T": [290.0 + k for k in range(8)]}
+    plot = plots.figure(stored(tmp_path, over=over))
+    bars = [ax for ax in plot.axes if not ax.get_xlabel() and "Initial" not in ax.get_ylabel()]
+    assert [bar.get_ylabel() for bar in bars] == [r"$\phi_{\mathrm{last}}$ [1]", r"$T_{\mathrm{max}}$ [K]"]
+
+
+def test_what_is_left_of_broken_bonds_is_no_map_and_a_bar_has_no_offset(tmp_path):
+    data = opened(stored(tmp_path, over={K_0: [100.0, 200.0], "initial.T": [290.0 + k for k in range(8)]}))
+    rest = data["phi_last"].copy(data=1e-13 * data["phi_last"].values)
+    warm = data["T_max"].copy(data=298.0 + 1e-3 * data["phi_last"].values)
+    plot = plots.figure(data.assign(phi_last=rest, T_max=warm, T_last=warm))
+    assert [ax.get_ylabel() for ax in plot.axes if "Initial" not in ax.get_ylabel()] == [r"$T_{\mathrm{max}}$ [K]"]
+    plot.draw_without_rendering()
+    assert plot.axes[1].yaxis.get_offset_text().get_text() == ""
+
+
 @pytest.fixture(scope="module")
 def grid():
     over = {K_0: [200.0, 300.0], "initial.T": [290.0 + k for k in range(8)]}

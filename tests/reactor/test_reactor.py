@@ -37,6 +37,24 @@ def compare(solution, dataset, tolerance=LOOSE):
         np.testing.assert_allclose(dataset[name].values, values, atol=tolerance * scale, rtol=0)
 
 
+@pytest.mark.parametrize(
+    ("entry", "arguments"),
+    [
+        (InterfaceReactor, ("exothermic", {"interface.kapa": 1.0})),
+        (InterfaceReactor, ("exothermic", {"interface.potential.bond-energy.K_0": "300 J/m^3"})),
+        (surfacechem.load, ("exothermic", {"interface.kapa": 1.0})),
+    ],
+)
+def test_the_traceback_of_a_wrong_input_ends_at_the_call(entry, arguments):
+    """One frame of ours is left, which raises."""
+    with pytest.raises(InputError) as caught:
+        entry(*arguments)
+    assert [frame.name for frame in caught.traceback] == [
+        "test_the_traceback_of_a_wrong_input_ends_at_the_call",
+        "called",
+    ]
+
+
 @pytest.mark.parametrize("name", ["exothermic", "dna-adhesive", "three-temperatures-no-capacity", "lubricated-sliding"])
 def test_same_trajectory_as_a_run(name):
     solution = surfacechem.run(name)

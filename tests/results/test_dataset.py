@@ -76,8 +76,15 @@ def test_every_kind_of_variable_is_in_a_file_that_is_checked():
     assert set().union(*map(kinds, names())) == set().union(*map(kinds, OF_EVERY_KIND))
 
 
+def test_texts_have_no_unit():
+    events = solved("stick-slip").dataset
+    assert [name for name, x in events.variables.items() if x.dtype.kind == "O" and "units" in x.attrs] == []
+    assert "units" not in solved("dna-adhesive").dataset["species"].attrs
+    assert events["event_time"].attrs["units"] == "s"
+
+
 def test_every_unit_follows_the_cf_conventions(suite, tmp_path):
-    units = sorted({column.unit for name in names() for column in solved(name).columns})
+    units = sorted({column.unit for name in names() for column in solved(name).columns if column.unit})
     times = [column for column in solved("exothermic").columns if column.name == "time"]
     others = [Column(f"x_{k}", ("time",), times[0].values, unit, "a quantity") for k, unit in enumerate(units)]
     write_netcdf(tmp_path / "units.nc", [*times, *others], solved("exothermic").attributes)

@@ -189,6 +189,9 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
             )
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
+    if law_reads(law, "f") and not depends(rate, symengine.Symbol("f")):
+        unset = ", ".join(name for name, _ in law.specs() if vars(law)[name] == 0)
+        build.add(f"{law.title} reads the force on bonds, but does not depend on it: without a value are {unset}.")
     if found := exponents(rate):
         build.add(CappedLaw(law.title, tuple(found)))
     return rate
