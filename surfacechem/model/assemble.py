@@ -317,35 +317,38 @@ class StartLimits:
     def __init__(self, system: System) -> None:
         states = [None if state.algebraic else state.symbol for state in system.states]
         symbols = [system.t, *states, *(parameter.symbol for parameter in system.parameters)]
-        self._places = {symbol: place for place, symbol in enumerate(symbols) if symbol is not None}
-        self._limits = [(margin, expression, _sum(expression, self._places)) for margin, expression in system.limits]
+        places = {symbol: place for place, symbol in enumerate(symbols) if symbol is not None}
+        self._limits = [(margin, _value_of(expression, places)) for margin, expression in system.limits]
 
     def check(self, y: Array, parameters: Array) -> None:
         """Raise InputError if these states and parameters are outside the range in which the laws hold."""
         numbers = [0.0, *y.tolist(), *parameters.tolist(), 1.0]
-        for margin, expression, terms in self._limits:
-            number = self._exactly(expression, terms, numbers)
+        for margin, value in self._limits:
+            try:
+                number = value(numbers)
+            except (RuntimeError, TypeError, ValueError):  # undefined, such as zero over zero
+                number = math.nan
             # A limit that reads an algebraic variable or a derivative is None: only the run can evaluate it.
             if number is not None and not number > 0:
                 remedy = f" {margin.remedy}" if margin.remedy else ""
                 message = f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}"
                 raise InputError(message, path=margin.path)
 
-    def _exactly(
-        self, expression: Expression, terms: Sequence[tuple[int, float]] | None, numbers: Sequence[float]
-    ) -> float | None:
-        """Return the value of an expression without roundoff; NaN if undefined, None if a symbol has no number.
 
-        ``terms`` are those of a sum of known symbols and numbers, None for any other expression.
-        """
-        try:
-            if terms is not None:
-                return math.fsum([factor * numbers[place] for place, factor in terms])
-            known = {x: self._places[x] for x in expression.free_symbols if x in self._places}
-            value = expression.subs({x: _exact(numbers[place]) for x, place in known.items()})
-            return None if value.free_symbols else float(value)
-        except (RuntimeError, TypeError, ValueError):  # undefined, such as zero over zero
-            return math.nan
+def _value_of(expression: Expression, places: Mapping[Any, int]) -> Callable[[Sequence[float]], float | None]:
+    """Return the function for the value of an expression without roundoff, None if a symbol has no number, from the
+    numbers at these places.
+    """
+    if (terms := _sum(expression, places)) is not None:
+        return lambda numbers: math.fsum([factor * numbers[place] for place, factor in terms])
+    known = {x: places[x] for x in expression.free_symbols if x in places}
+
+    @lru_cache(maxsize=64)  # runs that differ in other numbers, as a run and its second one, start from the same
+    def value(*own: float) -> float | None:
+        found = expression.subs(dict(zip(known, map(_exact, own), strict=True)))
+        return None if found.free_symbols else float(found)
+
+    return lambda numbers: value(*[numbers[place] for place in known.values()])
 
 
 def _sum(expression: Expression, places: Mapping[Any, int]) -> list[tuple[int, float]] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pickle import PicklingError
@@ -402,6 +402,22 @@ class System:
     def notes_of(self, kind: type[N]) -> tuple[N, ...]:
         """Return the notes of one kind."""
         return tuple(note for note in self.notes if isinstance(note, kind))
+
+    @cached_property
+    def cautions(self) -> tuple[tuple[Caution, ...], Any]:
+        """The cautions, and the function for the values of their expressions."""
+        found = self.notes_of(Caution)
+        return found, self._interpreted([item.expression for item in found])
+
+    @cached_property
+    def capped_laws(self) -> list[tuple[CappedLaw, Any]]:
+        """Laws whose rate may be capped, each with the function for its exponents."""
+        return [(law, self._interpreted(law.exponents)) for law in self.notes_of(CappedLaw)]
+
+    def _interpreted(self, expressions: Iterable[Expression]) -> Any:
+        """Return the function for the values of expressions, which are too few to be compiled."""
+        whole = [self.expand(expression) for expression in expressions]
+        return symengine.Lambdify(self.inputs, whole, backend="lambda") if whole else None
 
     @cached_property
     def profiles(self) -> tuple[Profile, ...]:

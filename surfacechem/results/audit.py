@@ -22,12 +22,11 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
-import symengine
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function
 from surfacechem.expressions import EXPONENT_CAP
-from surfacechem.model.system import CappedLaw, Caution, Range, RatePair, System, Total
+from surfacechem.model.system import Range, RatePair, System, Total
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.solve.contract import Array, Points
 from surfacechem.solve.run import Trajectory
@@ -442,7 +441,7 @@ def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]
 def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
     """Return all findings except the verdicts, in words."""
     system, rows = trajectory.model.system, np.empty((0, 0))
-    if [*system.notes_of(CappedLaw), *system.notes_of(Caution)]:  # arguments of compiled functions at outputs and steps
+    if system.capped_laws or system.cautions[0]:  # arguments of compiled functions at outputs and steps
         model, result, steps = trajectory.model, trajectory.result, trajectory.result.steps
         rows = model.inputs(result, result.times, result.outputs, trajectory.rates, result.segment)
         if steps is not None:
@@ -459,11 +458,8 @@ def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
 def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
     """Return warnings about laws whose rate exceeded exp(EXPONENT_CAP) at one of the states."""
     found = []
-    for law in system.notes_of(CappedLaw) if len(rows) else ():
-        # Interpreted rather than compiled, since they are needed once.
-        exponents = [system.expand(expression) for expression in law.exponents]
-        values = symengine.Lambdify(system.inputs, exponents, backend="lambda")(rows)
-        largest = float(np.nanmax(values, initial=-np.inf))
+    for law, exponents in system.capped_laws if len(rows) else ():
+        largest = float(np.nanmax(exponents(rows), initial=-np.inf))
         if largest > EXPONENT_CAP:
             found.append(
                 f"{law.title}: the logarithm of its rate coefficient (SI) reached {largest:.4g}; above "
@@ -474,11 +470,10 @@ def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
 
 def active_cautions(system: System, rows: NDArray[np.float64]) -> list[str]:
     """Return the cautions that apply at one of the states, given as arguments of compiled functions."""
-    cautions = system.notes_of(Caution)
+    cautions, function = system.cautions
     if not (cautions and len(rows)):
         return []
-    expressions = [system.expand(item.expression) for item in cautions]
-    values = symengine.Lambdify(system.inputs, expressions, backend="lambda")(rows).reshape(len(rows), -1)
+    values = function(rows).reshape(len(rows), -1)
     least, size = np.nanmin(values, axis=0), np.nanmax(np.abs(values), axis=0)
     return [item.text for item, x in zip(cautions, least < -RUN_EPS * size, strict=True) if x]
 

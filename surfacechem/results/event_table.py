@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from operator import attrgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,8 +27,7 @@ KINK = "kink of "
 """Prefix of the names of events at which only a formula changes."""
 
 
-@dataclass(frozen=True)
-class EventRow:
+class EventRow(NamedTuple):
     """An event with the states on both sides of it, and its jump if it is one."""
 
     t: float
@@ -55,14 +53,14 @@ def events_of(trajectory: Trajectory) -> list[EventRow]:
         if i < len(margins) and not margins[i].peak
     ]
     for j in trajectory.jumps:
-        row = EventRow(j.t, j.since, j.edge.name, j.edge.reason, j.before.y, j.after.y, j)
-        found.append(replace(row, released=j.released, entropy=j.entropy, verdict=j.verdict))
+        done = j.released, j.entropy, j.verdict
+        found.append(EventRow(j.t, j.since, j.edge.name, j.edge.reason, j.before.y, j.after.y, j, *done))
     if trajectory.run.rest is not None:
         y = trajectory.result.y
         found.append(EventRow(trajectory.run.rest, 0.0, STEADY, "came to rest, a steady state", y, y))
     last, rows = 0.0, []
     for event in sorted(found, key=lambda event: event.t):
-        rows.append(event if event.jump else replace(event, since=event.t - last))
+        rows.append(event if event.jump else event._replace(since=event.t - last))
         last = event.t if event.jump else last
     return rows
 

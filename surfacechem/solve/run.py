@@ -726,5 +726,8 @@ class Model:
         self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None
     ) -> Array:
         """Return the arguments of compiled functions along a trajectory."""
-        parameters = result.problem.parameters[result.segments_at(t, segment)]
-        return np.concatenate([t[:, None], y, ydot, parameters], axis=1)
+        n, parameters = self.program.n, result.problem.parameters
+        rows = np.empty((len(t), self.program.n_inputs))
+        rows[:, 0], rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n] = t, y, ydot
+        rows[:, 1 + 2 * n :] = parameters if len(parameters) == 1 else parameters[result.segments_at(t, segment)]
+        return rows
