@@ -139,10 +139,12 @@ GREEK = {
 def spelled(name: str) -> str:
     r"""Return the LaTeX of a name with its subscript.
 
-    >>> spelled("T_1"), spelled("phi"), spelled("D_coulomb"), spelled("theta_bond_s")
-    ('T_{1}', '\\phi', 'D_{\\mathrm{coulomb}}', '\\theta_{\\mathrm{bond\\,s}}')
+    >>> spelled("T_1"), spelled("phi"), spelled("D_coulomb"), spelled("theta_O_s")
+    ('T_{1}', '\\phi', 'D_{\\mathrm{coulomb}}', '\\theta_{\\mathrm{O(s)}}')
     """
     head, _, subscript = name.partition("_")
+    if head == "theta":  # species of a surface
+        subscript = re.sub(r"(?<=\w)_s(?=_|$)", "(s)", subscript)
     return f"{_letters(head)}_{{{_subscript(subscript)}}}" if subscript else _letters(head)
 
 

@@ -176,7 +176,7 @@ def check(
     """Describe a case in words, without running it."""
     from surfacechem.results.error_estimates import reasons
     from surfacechem.runs.check import consistent_start, groups, start_warnings, warnings
-    from surfacechem.runs.summaries import check_summary
+    from surfacechem.runs.summaries import check_summary, swept_in_words
     from surfacechem.solve import AUTO
 
     simulation = load_case(case, changes)
@@ -197,10 +197,14 @@ def check(
     why = reasons(problem, settings, system.has_moving_gap) if settings.solver == AUTO else ()
     settings = model.chosen(settings, values)
     sweep = []
-    if simulation.case.sweep is not None and simulation.case.sweep.keep is not None:
+    if simulation.case.sweep is not None:
         from surfacechem.runs.streaming import steps_of
+        from surfacechem.runs.sweeps import parameter_names
 
-        sweep = [("sweep", steps_of(simulation))]
+        plan = simulation.plan()
+        swept = swept_in_words(plan, parameter_names(system, plan), simulation.units)
+        swept += f", each until {' = '.join(map(str, plan.until))}" if plan.until else ""
+        sweep = [("sweep", swept if simulation.case.sweep.keep is None else f"{swept}; {steps_of(simulation)}")]
     show(check_summary(simulation.case.title, system, scene, settings, numbers, found, why, sweep))
 
 

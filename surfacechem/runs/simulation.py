@@ -424,7 +424,7 @@ class Simulation:
 
     def _as_before(self, trajectory: Trajectory) -> Trajectory:
         """Repeat a run of another grid with these cells, with the same values except those of the cells."""
-        values = {path: value for path, value in trajectory.values.items() if path in self._units}
+        values = {path: value for path, value in trajectory.values.items() if path in self.units}
         return self._solved(trajectory.run, values)[0]
 
     @concise
@@ -589,10 +589,10 @@ class Simulation:
             message = "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over."
             raise InputError(message, path="sweep")
         ends = None if until is None else read_until(from_plain(dict(until), Place(OVERRIDE, path="sweep.until")))
-        return plan_of(section, self._units, ends, arrays)
+        return plan_of(section, self.units, ends, arrays)
 
     @cached_property
-    def _units(self) -> dict[str, str]:
+    def units(self) -> dict[str, str]:
         """Units of all values that a run may change, by path, including parameters at their defaults."""
         system = self.system
         return {**{path: spec.unit for path, (spec, _) in system.constants.items()}, **system.changeable}
@@ -621,7 +621,7 @@ class Simulation:
         return self._freed[paths], values
 
     def _values(self, changes: Overrides) -> dict[str, float]:
-        units = self._units
+        units = self.units
         given = changes if isinstance(changes, Mapping) else assignments(changes)
         changes = {parameter_path(path, units): value for path, value in given.items()}
         unknown = next((path for path in changes if path not in units), None)

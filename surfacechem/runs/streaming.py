@@ -307,6 +307,7 @@ def failed_runs(path: Path, status: str) -> Plan:
 def steps_of(simulation: Simulation) -> str:
     """Return in words how the runs of the sweep of a case are stepped, if they are written to a store."""
     plan, section = simulation.plan(), simulation.case.sweep or SweepSection()
+    simulation, _ = simulation._ready({}, plan)
     return ChunkRuns(simulation, plan, keep_of(section.keep, sweeps.prepared(simulation.system, plan)), {}).steps
 
 

@@ -429,9 +429,13 @@ class SweepSolution(Results):
 
     @property
     def ends(self) -> str:
-        """Numbers of runs by status, in words."""
-        every = [run.status for run in self.runs]
-        return ", ".join(f"{every.count(status)} {status}" for status in dict.fromkeys(every))
+        """Numbers of runs by status, in words, with the reason why runs stopped or failed if it is one for all."""
+        why: dict[str, list[str]] = {}
+        for run in self.runs:
+            why.setdefault(run.status, []).append(run.reason.partition(" at t = ")[0])
+        one = {status: f" ({reasons[0]})" for status, reasons in why.items() if len({*reasons}) == 1 and reasons[0]}
+        one.pop("finished", None)
+        return ", ".join(f"{len(reasons)} {status}{one.get(status, '')}" for status, reasons in why.items())
 
     @property
     def status(self) -> str:

@@ -226,8 +226,15 @@ class TestCheck:
     def test_how_a_sweep_steps_is_told(self, call):
         swept = ["sweep.over={initial.T_2: [300 K, 310 K]}", "sweep.keep={last: [T_c]}"]
         text = call("check", "dna-adhesive", *(part for change in swept for part in ("--set", change))).stdout
-        assert re.search(r"^  sweep +eight runs at once, by Radau IIA of order 9$", text, re.MULTILINE)
+        told = "T_2 (300 to 310 K, 2 values); eight runs at once, by Radau IIA of order 9"
+        assert f"{told}\n" in text
         assert "eight runs" not in call("check", "dna-adhesive").stdout
+        spectrum = call("check", "force-spectroscopy").stdout
+        rebinding = call(
+            "check", "bond-constant-force", "--set", "sweep.over={interface.bonding.bell.k_on: [1 1/s, 2 1/s]}"
+        )
+        assert "  sweep      k_on (1 to 2 1/s, 2 values)\n" in rebinding.stdout, "of a parameter at its default"
+        assert "  sweep      rate (1e-13 to 1e-07 N/s, 61 values), each until f = 2e-10\n" in spectrum
 
     def test_algebraic_rows_are_named(self, call, tmp_path):
         heat = "".join(f"  - conductance: {{between: [interface, {b}], h: 10 W/m^2/K}}\n" for b in ("lower", "upper"))
