@@ -448,16 +448,21 @@ class Build:
             reason = f"{name} fell below {least if least != 0 else 'zero'}, {ends}"
             self.margins.append(Margin(f"{name} >= {least}", value - least + slack, reason))
         self._narrow_places(law, own, met)
+        self._limit_margins(law)
+
+    def _limit_margins(self, law: Law) -> None:
+        """Add the margins of the ranges of its variables that a law is made for."""
         for name, ends_of in law.limits.items():
             value = self.variables.get(name, law)
-            low, high = (None if end in (-math.inf, math.inf) else end for end in ends_of)
-            slack = NO_AMOUNT * sum(absolute(end) for end in (low, high) if end is not None)
             told = [f"{end:g}" if isinstance(end, int | float) else str(end) for end in ends_of]
+            given = [
+                each for each in zip((">=", "<="), ends_of, told, strict=True) if each[1] not in (-math.inf, math.inf)
+            ]
+            slack = NO_AMOUNT * sum(absolute(end) for _, end, _ in given)
             reason = f"{name} left the range of {law.called}, {' to '.join(told)}"
-            if low is not None:
-                self.margins.append(Margin(f"{name} >= {told[0]}", value - low + slack, reason, domain=True))
-            if high is not None:
-                self.margins.append(Margin(f"{name} <= {told[1]}", high + slack - value, reason, domain=True))
+            for side, end, text in given:
+                inside = value - end + slack if side == ">=" else end + slack - value
+                self.margins.append(Margin(f"{name} {side} {text}", inside, reason, domain=True))
 
     def _read(self, law: Law, name: str, own: Mapping[str, Expression]) -> Expression:
         """Return the expression that a law reads by a name: from its own arguments, else from the scene."""
