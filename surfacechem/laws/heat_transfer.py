@@ -302,7 +302,21 @@ class BondedPressureConductance(UnderPressure, HeatTransfer):
         return h_0 + h_c * power(p / self.H, self.q)
 
 
-class CooperMikicYovanovich(UnderPressure, HeatTransfer):
+class Conforming(UnderPressure, HeatTransfer):
+    """Conductance of conforming rough surfaces that touch in spots."""
+
+    channel = "spots"
+
+    k: float = parameter("W/(m K)", "harmonic mean of the conductivities, 2 k_1 k_2 / (k_1 + k_2)", above=0)
+    m: float = parameter("1", "mean absolute slope of the asperities, sqrt(m_1^2 + m_2^2)", above=0)
+    sigma: float = parameter("m", "rms roughness, sqrt(sigma_1^2 + sigma_2^2)", above=0)
+
+    @abstractmethod
+    def conductance(self, p: Expression) -> Expression:
+        """Conductance [W/(m^2 K)] under a pressure."""
+
+
+class CooperMikicYovanovich(Conforming):
     r"""Conductance of conforming rough surfaces whose asperities deform plastically.
 
     .. math:: h = 1.25\,\frac{k\,m}{\sigma} \left(\frac{p}{H}\right)^{0.95}
@@ -315,11 +329,6 @@ class CooperMikicYovanovich(UnderPressure, HeatTransfer):
     3531.343862
     """
 
-    channel = "spots"
-
-    k: float = parameter("W/(m K)", "harmonic mean of the conductivities, 2 k_1 k_2 / (k_1 + k_2)", above=0)
-    m: float = parameter("1", "mean absolute slope of the asperities, sqrt(m_1^2 + m_2^2)", above=0)
-    sigma: float = parameter("m", "rms roughness, sqrt(sigma_1^2 + sigma_2^2)", above=0)
     H: float = parameter("Pa", "micro-hardness of the softer body", above=0)
 
     @property
@@ -334,7 +343,7 @@ class CooperMikicYovanovich(UnderPressure, HeatTransfer):
         return 1.25 * self.k * self.m / self.sigma * power(p / self.H, 0.95)
 
 
-class MikicElastic(UnderPressure, HeatTransfer):
+class MikicElastic(Conforming):
     r"""Conductance of conforming rough surfaces whose asperities deform elastically.
 
     .. math:: h = 1.55\,\frac{k\,m}{\sigma} \left(\frac{\sqrt2\,p}{E' m}\right)^{0.94}
@@ -347,11 +356,6 @@ class MikicElastic(UnderPressure, HeatTransfer):
     1308.895166
     """
 
-    channel = "spots"
-
-    k: float = parameter("W/(m K)", "harmonic mean of the conductivities, 2 k_1 k_2 / (k_1 + k_2)", above=0)
-    m: float = parameter("1", "mean absolute slope of the asperities, sqrt(m_1^2 + m_2^2)", above=0)
-    sigma: float = parameter("m", "rms roughness, sqrt(sigma_1^2 + sigma_2^2)", above=0)
     E: float = parameter("Pa", "effective modulus E', 1 / [(1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2]", above=0)
 
     @property
@@ -367,7 +371,7 @@ class MikicElastic(UnderPressure, HeatTransfer):
         return 1.55 * self.k * self.m / self.sigma * power(relative, 0.94)
 
 
-class SongYovanovich(UnderPressure, HeatTransfer):
+class SongYovanovich(Conforming):
     r"""Conductance of plastic asperities whose hardness depends on the size of the indents.
 
     .. math:: h = 1.25\,\frac{k\,m}{\sigma} \left(\frac{p}{H_c}\right)^{0.95}, \quad
@@ -384,11 +388,6 @@ class SongYovanovich(UnderPressure, HeatTransfer):
     2172.293834
     """
 
-    channel = "spots"
-
-    k: float = parameter("W/(m K)", "harmonic mean of the conductivities, 2 k_1 k_2 / (k_1 + k_2)", above=0)
-    m: float = parameter("1", "mean absolute slope of the asperities, sqrt(m_1^2 + m_2^2)", above=0)
-    sigma: float = parameter("m", "rms roughness, sqrt(sigma_1^2 + sigma_2^2)", above=0)
     c_1: float = parameter("Pa", "Vickers hardness at an indent of 1 um", above=0)
     c_2: float = parameter("1", "size index of the hardness, negative where small indents are harder", above=-10)
 

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import pytest
-from CoolProp.CoolProp import PropsSI
 
 import surfacechem
 from surfacechem import format as case
@@ -130,6 +129,8 @@ def test_what_a_mixture_costs_is_told():
     ("name", "pressure"), [("Air.mix", 1e5), ("Water[0.5]&Ethanol[0.5]", 1e5), ("Methane[0.9]&Ethane[0.1]", 2e7)]
 )
 def test_a_mixture_has_the_properties_that_coolprop_finds_without_its_phase(name, pressure):
+    from CoolProp.CoolProp import PropsSI  # reads all fluids for seconds
+
     fluid, T = CoolPropFluid(name, pressure), np.array([290.0, 320.0])
     for quantity, letter in (("rho_m", "D"), ("cp_m", "C")):
         known = PropsSI(letter, "T", T, "P", pressure, name)

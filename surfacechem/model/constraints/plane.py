@@ -23,14 +23,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import partial
 from typing import Any
 
 import symengine
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, absolute, cos, depends, derivative, norm, sin, sqrt, where
+from surfacechem.expressions import Expression, absolute, cos, depends, derivative, norm, polynomial, sin, sqrt, where
 from surfacechem.model.automaton import ZERO, Constraint, Mode, Register
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components.formulation import PLACE, Formulation, evolve, growth, name_traction
@@ -257,13 +257,8 @@ def _elliptic(pull: Sequence[Expression], sizes: Sequence[Expression]) -> tuple[
     reach, (along, _) = norm(x * b, y * a), _turned((x * b, y * a))
     across = [_turned(part)[1] for part in ((x * b_0, y * a_0), (x * b_1, y * a_1))]
     whole, double = reach * (reach + a * b), reach + along
-    size = norm(x, y) * _power_series(excess) / where(whole > 0, whole, 1)
-    return size, _power_series(across) / where(double > 0, double, 1)
-
-
-def _power_series(terms: Sequence[Expression]) -> Expression:
-    """Return the polynomial of the speed with these coefficients."""
-    return reduce(lambda total, term: total * SPEED + term, reversed(terms))
+    size = norm(x, y) * polynomial(SPEED, excess) / where(whole > 0, whole, 1)
+    return size, polynomial(SPEED, across) / where(double > 0, double, 1)
 
 
 def _resistance(build: Build, side: Component) -> Expression:

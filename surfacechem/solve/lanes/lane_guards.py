@@ -10,6 +10,7 @@ import numpy as np
 from surfacechem.solve.lanes.lane_step import larger, put_end, put_inside, smaller
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
 from surfacechem.solve.radau.explicit import DENSEST
+from surfacechem.solve.radau.guards import is_limit
 from surfacechem.solve.radau.tables import SCANNED
 from surfacechem.solve.radau.work import MARGINS, compiled, evaluate
 from surfacechem.tolerances import CBRT_EPS, EPS, FORMULA_EPS, NEWTON_EPS, RUN_EPS, TINY
@@ -18,12 +19,6 @@ SCAN_FRACTIONS = SCANNED[DENSEST]
 """Fractions of a step at which guards are evaluated."""
 MOST_SECANTS = 12
 """Most trial steps onto a guard: secant steps take four, the rounding of the guard a few more."""
-
-
-@compiled
-def _is_limit(w: Any, m: int) -> bool:
-    """True if the run must end where this guard is below zero. It may start at zero, and is unclear if it falls."""
-    return bool(w.kinds[m, 0] == 1 and w.kinds[m, 1] <= 0)
 
 
 @compiled
@@ -41,7 +36,7 @@ def start_margins(w: Any, fresh: Any) -> None:
         put(w.side[m], where(fresh, side, lanes(w.side[m])))
         if w.kinds[m, 4] == 0:
             put(w.side[m], 0.0)
-        elif _is_limit(w, m):
+        elif is_limit(w, m):
             unclear = where(side < -0.5, 1.0, unclear)
         else:
             unclear = where((side == 0.0) & (lanes(w.fired[m]) < 0.5), 1.0, unclear)
@@ -145,7 +140,7 @@ def _scan(w: Any, searched: Any) -> None:
             leaves = searched & (side == 0.0) & (absolute(value) > FORMULA_EPS * largest)
             if w.kinds[m, 4] != 0:
                 put(w.side[m], where(leaves, where(value > 0.0, 1.0, -1.0), side))
-                if _is_limit(w, m):
+                if is_limit(w, m):
                     put(w.unclear, where(leaves & (value < 0.0), 1.0, lanes(w.unclear)))
         earlier, before = before, x
 
