@@ -152,7 +152,7 @@ CONTROL_RTOL = 3e-14
 LINEAR_RTOL = 1e-6
 """Tightest tolerance of linearly implicit steps in lanes. Each digit takes 1.6 (the fifth root of ten) times as many of
 them, but only 1.2 times as many of Radau IIA, of which one takes four times as long. Both take as long here on a smooth
-stiff run; where Newton's method shortens steps of Radau IIA, as in a rupture, these take a third of the time.
+stiff run; where Newton's method shortens steps of Radau IIA, as in a rupture, these take a quarter of the time.
 """
 
 LOOSEST_RTOL = 1e-3

@@ -140,6 +140,23 @@ def test_a_step_onto_a_guard_may_be_shorter_than_time_resolves(left):
     assert_alike(found, solve_arrays(problem, y0, table, *others), problem.program.n, 1e-5)
 
 
+@pytest.mark.parametrize(("explicit", "rtol"), [(True, 1e-9), (False, 1e-9), (False, 1e-5)])
+def test_a_kink_that_starts_at_zero_fires_once_it_has_left(explicit, rtol, left):
+    """A load that rises from zero and returns to it: the kink there counts when it is met again."""
+    t, (x, y, dx, dy), a = se.Symbol("t"), se.symbols("x y dx dy"), se.Symbol("a")
+    program = compile_program(t, [x, y], [dx, dy], [a], [dx - a * (1 - 2 * t), dy + x * y], margins=[x])
+    table = np.random.default_rng(0).uniform(1, 3, (RUNS, 1, 1))
+    shared = problem(program, [0.0, 1.0], [0.0, 1.5], rtol, parameters=table[0], margins=(Guard.restart(),))
+    alike = np.array([shared.spacing]), np.zeros((1, 1)), shared.segments[None], np.zeros((1, 0))
+    columns = np.tile(shared.y0, (RUNS, 1)), table, *alike
+    lanes = replace(shared, explicit=explicit, implicit_lanes=not explicit)
+    found = lane_batch.solve_batch(lanes, *columns)
+    assert left[0] == 0
+    assert found.counts[:, EVENTS].tolist() == [1] * RUNS
+    assert found.events[:, 0, 1] == pytest.approx(1.0, rel=1e-9)
+    assert_alike(found, solve_arrays(shared, *columns), 2, 10 * rtol)
+
+
 def test_a_step_onto_a_guard_that_fails_is_given_up(left):
     """Bonds that share a growing load and cool a light interface as they break: short of the guard a long step has
     seen, shorter ones may fail. All runs break, none by the stepper for single runs.

@@ -23,7 +23,9 @@ MOST_SECANTS = 12
 
 @compiled
 def start_margins(w: Any, fresh: Any) -> None:
-    """Set the sides of the guards at a start or restart; a guard that may be zero there is unclear."""
+    """Set the sides of the guards at a start or restart; a limit that may be beyond zero there is unclear. One that is
+    at zero has no side until it leaves.
+    """
     unclear = same(0.0)
     evaluate(w, MARGINS, w.margin)
     for m in range(w.n_margins):
@@ -38,8 +40,6 @@ def start_margins(w: Any, fresh: Any) -> None:
             put(w.side[m], 0.0)
         elif is_limit(w, m):
             unclear = where(side < -0.5, 1.0, unclear)
-        else:
-            unclear = where((side == 0.0) & (lanes(w.fired[m]) < 0.5), 1.0, unclear)
     put(w.unclear, unclear)
 
 

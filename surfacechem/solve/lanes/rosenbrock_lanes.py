@@ -21,10 +21,10 @@ from surfacechem.solve.lanes.radau_lanes import (
     check_outputs,
     differentiate,
     factor,
-    find_defects,
     is_noise,
     limit_growth,
 )
+from surfacechem.solve.lanes.radau_lanes import find_defects as find_errors
 from surfacechem.solve.lanes.vector import absolute, exponential, lanes, logarithm, put, same, where
 from surfacechem.solve.radau.driver import LEAST_NORM
 from surfacechem.solve.radau.record import StepperRecord, laying_out
@@ -113,6 +113,16 @@ def interpolate(w: Any, columns: int) -> None:
     put_start(w)
     differentiate(w)
     factor(w, 0, rate / GAMMA_OF_STAGES, same(0.0))
+
+
+@compiled
+def find_defects(w: Any, lane: int, x: Any) -> None:
+    """The defects of the dense output as in steps of Radau IIA, but without their loosening, which belongs to an estimate
+    of half the order of the step.
+    """
+    find_errors(w, lane, x)
+    for m in range(w.n):
+        put(w.rates[m], lanes(w.rates[m]) * w.loose)
 
 
 @compiled
