@@ -117,8 +117,8 @@ def interpolate(w: Any, columns: int) -> None:
 
 @compiled
 def find_defects(w: Any, lane: int, x: Any) -> None:
-    """The defects of the dense output as in steps of Radau IIA, but without their loosening, which belongs to an estimate
-    of half the order of the step.
+    """The defects of the dense output as in steps of Radau IIA, but without their loosening, which belongs to an
+    estimate of half the order of the step.
     """
     find_errors(w, lane, x)
     for m in range(w.n):
