@@ -215,7 +215,9 @@ def fewer(trajectory: Trajectory, late: float = 0.0) -> Trajectory:
     times = trajectory.result.times
     if len(times) <= MOST_TIMES:
         return trajectory
-    rows = np.union1d(np.flatnonzero(_off_events(trajectory, late)), [0, len(times) - 1])
+    kept = _off_events(trajectory, late)
+    kept[[0, -1]] = True
+    rows = np.flatnonzero(kept)
     return trajectory.at_times(times[np.unique(rows[np.linspace(0, len(rows) - 1, MOST_TIMES).round().astype(int)])])
 
 

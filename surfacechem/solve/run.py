@@ -193,9 +193,11 @@ class Trajectory:
         return found
 
     def at_times(self, times: Sequence[float] | Array) -> Trajectory:
-        """Return the trajectory with only the outputs at these times."""
-        kept = self.picked(np.isin(self.result.times, times))
-        return replace(kept, run=replace(self.run, times=tuple(times)))
+        """Return the trajectory with only the outputs at these times, which increase."""
+        wanted = np.asarray(times)
+        found = self.picked(among(self.result.times, wanted))
+        vars(found).update(run=replace(self.run, times=tuple(wanted.tolist())))
+        return found
 
     @property
     def written(self) -> States:
