@@ -178,9 +178,9 @@ class SharedLoadCluster(Cluster):
             return np.exp(-w) / (x_0 + w)
 
         def elapsed(w: Array) -> tuple[Array, Array]:
-            apart = scaled_expint(1, np.array(x_0)) - np.exp(-w) * scaled_expint(1, x_0 + w)
+            apart = whole - np.exp(-w) * scaled_expint(1, x_0 + w)
             near = w < 0.25 * min(1.0, x_0)  # the integrals would cancel
-            return np.where(near, short_integral(slope, w), apart), slope(w)
+            return np.where(near, short_integral(slope, w), apart) if near.any() else apart, slope(w)
 
         def log_left(w: Array) -> tuple[Array, Array]:
             left = scaled_expint(1, x_0 + w)

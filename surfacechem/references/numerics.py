@@ -337,6 +337,8 @@ def _by_range(
 ) -> Array:
     """Evaluate two formulas, one where the mask is set and one elsewhere, each only in its range."""
     x = np.asarray(x)
+    if below.all():
+        return np.asarray(near(x))
     found = np.empty(x.shape)
     for formula, own in ((near, below), (far, ~below)):
         if own.any():  # an evaluation of no values takes as long as one of a few
