@@ -422,7 +422,7 @@ def client_at(address: str | None) -> Iterator[Any]:
         message = "a cluster needs dask.distributed, which is not installed: pip install 'surfacechem[cluster]'."
         raise InputError(message, Place(path="--cluster")) from None
     try:
-        client: Any = Client(address, timeout=10, set_as_default=False)  # type: ignore[no-untyped-call]
+        client: Any = Client(address, timeout=10, set_as_default=False)
     except (OSError, ValueError) as error:
         message = f"no scheduler answers at {address}: {' '.join(str(error).split())}"
         raise InputError(message, Place(path="--cluster")) from None

@@ -36,7 +36,7 @@ LANE, MASK = _Lanes(name="Lanes"), _Lanes(name="Mask")
 @register_model(_Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, VECTOR if kind is LANE else INTEGERS)  # type: ignore[no-untyped-call]
+        super().__init__(manager, kind, VECTOR if kind is LANE else INTEGERS)
 
 
 def _spread(builder: Any, value: Any) -> Any:

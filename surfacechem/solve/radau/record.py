@@ -85,14 +85,14 @@ class StepperRecord(types.Type):
 @register_model(StepperRecord)
 class _RecordModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _POINTER)  # type: ignore[no-untyped-call]
+        super().__init__(manager, kind, _POINTER)
 
 
 @infer_getattr
 class _RecordFields(AttributeTemplate):
     key = StepperRecord
 
-    def generic_resolve(self, record: Any, name: str) -> Any:  # type: ignore[override]
+    def generic_resolve(self, record: Any, name: str) -> Any:
         return _typeof(record.method[name]) if name in record.method else record.fields[name].kind
 
 
@@ -110,7 +110,7 @@ def _fixed(builder: Any, work: Any, place: int, kind: Any) -> Any:
     return value
 
 
-@lower_getattr_generic(StepperRecord)  # type: ignore[no-untyped-call]
+@lower_getattr_generic(StepperRecord)
 def _load_field(context: Any, builder: Any, record: Any, work: Any, name: str) -> Any:
     if name in record.method:
         part = record.method[name]
@@ -143,7 +143,7 @@ def _load_field(context: Any, builder: Any, record: Any, work: Any, name: str) -
     return value
 
 
-@lower_setattr_generic(StepperRecord)  # type: ignore[no-untyped-call]
+@lower_setattr_generic(StepperRecord)
 def _store_field(_context: Any, builder: Any, signature: Any, args: Any, name: str) -> None:
     record = signature.args[0]
     assert name in record.numbers, f"{name} does not change"
