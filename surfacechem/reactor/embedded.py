@@ -19,7 +19,7 @@ from surfacechem.expressions import depends
 from surfacechem.format import Case
 from surfacechem.mechanism.evaluated import HeldPhase
 from surfacechem.model.assemble import assemble
-from surfacechem.model.system import System
+from surfacechem.model.system import END_PATH, System
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import coupling
 from surfacechem.results.solution import Solution
@@ -34,6 +34,9 @@ from surfacechem.tolerances import DEFAULT_RTOL, NEGLIGIBLE, SQRT_EPS, TINY
 
 NO_END = 1e300
 """End of the last load segment [s]."""
+
+ASSUMED_LENGTH = 1.0
+"""Length of an integration that is assumed if no end is given [s]."""
 
 NONE: Mapping[str, Callable[[float], float]] = {}
 
@@ -347,6 +350,9 @@ class EmbeddedScene:
         run = Run(times=(0.0, NO_END), rtol=max(rtol, DIFFERENCE_STEPS))
         table = self.model.problem(run, self.values, passing=False).parameters
         parameters = table[bisect_right(self.breakpoints, t)]
+        if END_PATH in self.places:  # what is brief in a run; a network has no end
+            own = self.case.own_run
+            parameters[self.places[END_PATH]] = own.times[-1] if own else ASSUMED_LENGTH
         if self.events:
             self.events.begin_segment(parameters)
         else:

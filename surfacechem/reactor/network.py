@@ -14,6 +14,7 @@ import numpy as np
 
 from surfacechem.errors import InputError
 from surfacechem.reactor.coupling import HeatWall
+from surfacechem.reactor.embedded import ASSUMED_LENGTH
 from surfacechem.reactor.interface_reactor import InterfaceReactor
 from surfacechem.reactor.watch import LATER_AHEAD, StepWatcher
 from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_step
@@ -22,10 +23,6 @@ from surfacechem.solve.contract import Array, Counters, Guard
 
 STEPS_OF_A_RESIDUAL = 10
 """Steps between two tests for a steady state, as in Cantera."""
-
-ASSUMED_LENGTH = 1.0
-"""Length of the integration that is assumed if no end is given [s]."""
-
 
 SETTINGS = (
     *("energy_enabled", "chemistry_enabled", "device_coefficient", "time_function", "pressure_function"),

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import surfacechem
 from surfacechem.reactor import InterfaceReactor
 
 COMBINED = {
@@ -24,3 +25,15 @@ def test_fixed_combinations_of_the_rates_of_states(case):
     scene, found = interface.scene, interface.combined(0.0)
     names = {(scene.states[i], scene.accounts[j]): found[i, j] for i, j in zip(*np.nonzero(found), strict=True)}
     assert names == pytest.approx(COMBINED[case], rel=1e-9)
+
+
+def test_slip_turns_as_in_a_run():
+    """A network has no end; what is brief in the run of the case still is, and slip turns at any speed above that."""
+    solution = surfacechem.run("pulled-at-an-angle")
+    result, scene = solution.trajectory.result, InterfaceReactor("pulled-at-an-angle").scene
+    end, count = np.array([result.t]), len(scene.states)
+    row = solution.trajectory.model.inputs(result, end, result.y[None], result.ydot[None])[0]
+    scene.evaluation.parameters[:] = row[1 + 2 * count :]
+    scene.begin_segment(result.t, 1e-9)
+    rates = scene.rates(result.t, np.concatenate((result.y, result.ledger)))
+    np.testing.assert_allclose(rates[:count], result.ydot, rtol=1e-6)
