@@ -536,6 +536,12 @@ class System:
         columns = {parameter.symbol: j for j, parameter in enumerate(self.parameters)}
         return {mode.name: columns[mode.symbol] for mode in self.modes}
 
+    @cached_property
+    def given_values(self) -> dict[str, float]:
+        """Parameters and initial values of the scene in SI, by path."""
+        values = {parameter.path: parameter.at(0.0) for parameter in self.parameters}
+        return values | {state.path: state.at_start[1] for state in self.states}
+
     def initial_state(self, values: Mapping[str, float]) -> Array:
         """Return the initial values of the states, from given values by path."""
         return np.array([state.from_given(values) for state in self.states])
@@ -634,7 +640,7 @@ class System:
 
     def active_guards(self, parameters: Array) -> tuple[bool, ...]:
         """Return a flag for each guard, moving margins and then edges: active in the modes among the parameters."""
-        return tuple(all(parameters[j] in values for j, values in when) for when in self._when)
+        return tuple(not when or all(parameters[j] in values for j, values in when) for when in self._when)
 
     @property
     def guard_conditions(self) -> list[tuple[int, int, float]]:

@@ -332,10 +332,10 @@ class Simulation:
         """Return the simulation with the cells that the accuracy needs, its run or its runs over a plan, and the errors
         of the cells of each run if an accuracy determines all cells.
         """
+        if spatial.asked_cell_accuracy(self.case.scene) is None:
+            return self, self._solved(settings, values, plan, threads), []
         chosen = self._with(spatial.tightened(self.case.scene, settings.accuracy))
         scene, system = chosen.case.scene, chosen.system
-        if spatial.asked_cell_accuracy(scene) is None:
-            return chosen, chosen._solved(settings, values, plan, threads), []
         from surfacechem.runs import sweeps
 
         points = [values_of(system, {**values, **point}) for point in (plan.points if plan else [{}])]

@@ -101,6 +101,11 @@ class Run:
                 f"rtol must lie in (0, 1), and atol must be finite and not negative: {self.rtol:g}, {self.atol}."
             )
 
+    @cached_property
+    def moments(self) -> Array:
+        """Output times [s]."""
+        return np.asarray(self.times, dtype=float)
+
     @property
     def samples(self) -> float:
         """Number of parts of the run in each of which steps are checked at least once against the equations inside."""
@@ -373,8 +378,7 @@ class Trajectory:
 
 def values_of(system: System, changes: Mapping[str, float] | None = None) -> dict[str, float]:
     """Return every parameter and initial value by path, with some of them changed."""
-    values = {parameter.path: parameter.at(0.0) for parameter in system.parameters}
-    values |= {state.path: state.at_start[1] for state in system.states}
+    values = system.given_values.copy()
     if not changes:
         return values
     specs = {s.path: POSITIVE_SPEC if s.given and not s.given.state else STATE_SPEC for s in system.states}
@@ -552,7 +556,7 @@ class Model:
         return Problem(
             program=self.program if run.accounts or self.jumper else self._without_accounts,
             y0=start,
-            times=np.asarray(run.times, dtype=float),
+            times=run.moments,
             segments=segments,
             parameters=parameters,
             rtol=run.rtol,
