@@ -195,10 +195,15 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
 
 
 def swiftest(states: Sequence[State], result: Result) -> str:
-    """Describe the state with the fastest relative change if the step size underflowed; otherwise empty."""
+    """Describe the state with the fastest relative change if the step size underflowed, or that none changes; otherwise
+    empty.
+    """
     if result.status is not Status.STEP_UNDERFLOW:
         return ""
-    j = int(np.argmax(_speeds(states, result)))
+    speeds = _speeds(states, result)
+    j = int(np.argmax(speeds))
+    if speeds[j] == 0:
+        return ": no state changes there; what grows too fast is an account, of heat or of what is made"
     unit, value, rate = states[j].quantity.unit, result.y[j], result.ydot[j]
     return f": {states[j].name} = {value:.3g} {unit}".removesuffix(" 1") + f" changes by {rate:.3g} {unit}/s"
 

@@ -89,6 +89,8 @@ def test_only_what_gets_faster_runs_away(row, start, reason):
     assert result.status is Status.STEP_UNDERFLOW
     assert str(runaway(states, result)).startswith(reason)
     assert swiftest(states, result) == f": phi = {result.y[0]:.3g} changes by {result.ydot[0]:.3g} 1/s"
+    still = SimpleNamespace(status=result.status, y=result.y, ydot=np.zeros(1))
+    assert swiftest(states, still).startswith(": no state changes there")
 
 
 @pytest.mark.parametrize("name", names)
