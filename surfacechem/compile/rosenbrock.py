@@ -32,6 +32,10 @@ from the line between its ends.
 """
 STAGES = len(NODES)
 DENSE = np.array(_DENSE)
+MOST_NONZEROS = 2**8
+"""Number of nonzero derivatives, as of 16 states that all depend on each other, up to which the code of a step is made
+in about a second; it grows with the products of an elimination.
+"""
 MOST_LOST = 0.1 * LINEAR_RTOL / EPS
 """Factor by which terms may exceed what is left of them: their roundoff is then a tenth of the tolerance."""
 

@@ -277,6 +277,21 @@ def test_linearly_implicit_runs_keep_the_tolerance(name, others, rtol, left, mon
     assert_alike(found, exact, problem.program.n, 100 * rtol)
 
 
+@pytest.mark.parametrize(
+    ("n", "rtol", "accounts", "linear"),
+    [(4, 1e-6, 0, True), (4, 9e-7, 0, False), (4, 1e-3, 1, False), (16, 1e-3, 0, True), (17, 1e-3, 0, False)],
+)
+def test_linearly_implicit_steps_are_for_loose_tolerances_without_accounts_and_for_small_systems(
+    n, rtol, accounts, linear
+):
+    t, y, rates = se.Symbol("t"), se.symbols(f"y:{n}"), se.symbols(f"r:{n}")
+    rows = [rate + i * x * sum(y) for i, (rate, x) in enumerate(zip(rates, y, strict=True), 1)]
+    program = compile_program(t, y, rates, [], rows, ledger=[y[0]] * accounts)
+    shared = problem(program, np.ones(n), [0.0, 1.0], rtol, implicit_lanes=True)
+    methods = [lane_batch.ROSENBROCK, lane_batch.RADAU]
+    assert list(lane_batch.methods_of(shared)) == methods[not linear :]
+
+
 def test_threads_change_nothing():
     problem, (y0, table, *others) = arrays_of(case_runs.load("dna-adhesive"), 24, implicit=True)
     whole = lane_batch.solve_batch(problem, y0, table, *others).ends

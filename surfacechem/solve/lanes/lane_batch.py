@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from surfacechem.compile.rosenbrock import MOST_NONZEROS
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.contract import Array, Problem, Status
 from surfacechem.solve.lanes.layout import EXPLICIT_MEMORY, RADAU_MEMORY, ROSENBROCK_MEMORY, SIZES
@@ -92,7 +93,7 @@ def methods_of(problem: Problem) -> Iterator[LaneMethod]:
     """Yield the methods of a batch in lanes, each for what those before leave; none if its runs are solved alone."""
     if problem.explicit and problem.program.lanes:
         yield EXPLICIT
-    if problem.implicit_lanes and problem.program.implicit_lanes:
-        if problem.rtol >= LINEAR_RTOL and not problem.program.n_ledger:
+    if problem.implicit_lanes and (lanes := problem.program.implicit_lanes):
+        if problem.rtol >= LINEAR_RTOL and not problem.program.n_ledger and len(lanes.nonzeros) <= MOST_NONZEROS:
             yield ROSENBROCK
         yield RADAU
