@@ -144,7 +144,7 @@ def spelled(name: str) -> str:
     """
     head, _, subscript = name.partition("_")
     if head == "theta":  # species of a surface
-        subscript = re.sub(r"(?<=\w)_s(?=_|$)", "(s)", subscript)
+        subscript = re.sub(r"(?<=\w)_([sS])(?=_|$)", r"(\1)", subscript)
     return f"{_letters(head)}_{{{_subscript(subscript)}}}" if subscript else _letters(head)
 
 

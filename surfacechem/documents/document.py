@@ -90,6 +90,8 @@ class Tree:
         allowed = None if known is None else list(known)
         if not isinstance(self.value, dict):
             wanted = f" with the {what} {', '.join(allowed)}" if allowed else ""
+            if allowed and len(allowed) == 1 and isinstance(self.value, str):
+                wanted = f", `{{{allowed[0]}: {self.value}}}`"
             raise self.error(f"this must be a mapping{wanted}, not {self.shown}.")
         for key, child in self.value.items():
             if allowed is not None and key not in allowed:

@@ -547,7 +547,7 @@ class InterfaceReactor(StateVectorReactor):
         return bool(self.bodies or self.ports or self.loads or self.neighbours)
 
     def record(self, t: float) -> None:
-        """Record the present state for the dataset; a `ReactorNet` of this package does so after every step.
+        """Record the present state for the dataset; a `ReactorNet` of this package does so at every advance and step.
 
         Parameters
         ----------

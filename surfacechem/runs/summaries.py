@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from surfacechem.contracts.terms import Load, Varying
+from surfacechem.quantities import VARIABLES
 from surfacechem.results.event_table import entropy_destroyed, event_counts, event_summary
 from surfacechem.runs.listing import Rows, Sheet, counted
 from surfacechem.solve import AUTO, CALLING_PYTHON, OWN
@@ -43,6 +45,9 @@ REGIMES = {
     "perfect contact without a medium": "the bodies share one temperature and there is no medium between them.",
 }
 
+
+MOST_ALIKE = 4
+"""Largest number of laws of one name whose parameters are listed."""
 
 MOST_EVENTS, MOST_RUNS = 30, 100
 """Largest numbers of events of a run, and of runs of a sweep, that are listed."""
@@ -242,18 +247,14 @@ def check_summary(
     sweep: Sequence[tuple[str, str]] = (),
 ) -> Sheet:
     """Describe a scene in words, with its dimensionless numbers and warnings; ``sweep`` are facts of its sweep."""
-    from surfacechem.runs.check import laws_of
-
     sections: dict[str, Sequence[Sequence[str]]] = {
         "Choices": choices,
         "States": _state_rows(system),
         "Roles": [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"],
         "Modes": [(mode.name, mode.legend) for mode in system.modes if len(mode.words) > 1],
         "Transitions": list(dict.fromkeys((item.name, item.reason) for item in system.edges)),
-        "Laws": [
-            (contract, f"{name}, {count} times" if count > 1 else name)
-            for (contract, name), count in Counter((law.contract, law.name()) for law in laws_of(scene)).items()
-        ],
+        "Loads": _load_rows(scene),
+        "Laws": _law_rows(scene),
         "Surfaces": surface_rows(scene),
         "Numbers": [(g.name, f"{g.value:.4g} {g.unit if g.unit != '1' else ''}".rstrip(), g.text) for g in groups],
         "Warnings": [(warning,) for warning in warnings],
@@ -262,6 +263,27 @@ def check_summary(
     facts += [("compiled", _compiled(system, run))] if run is not None else []
     facts += sweep
     return Sheet(title or "untitled", facts, sections)
+
+
+def _law_rows(scene: Scene) -> list[tuple[str, ...]]:
+    """Return rows with the laws of a scene and their parameters; of many of one name only their number."""
+    from surfacechem.runs.check import laws_of
+
+    every = laws_of(scene)
+    kinds = [(law.contract, law.name()) for law in every]
+    few = {kind for kind, count in Counter(kinds).items() if count <= MOST_ALIKE}
+    pairs = zip(kinds, every, strict=True)
+    rows = Counter((*kind, _numbers(law) if kind in few else "") for kind, law in pairs)
+    return [(kind, f"{name}, {count} times" if count > 1 else name, told) for (kind, name, told), count in rows.items()]
+
+
+def _load_rows(scene: Scene) -> list[tuple[str, ...]]:
+    """Return rows with what is prescribed and its history: temperatures that are held, and loads."""
+    ends = [*((body.name, body.temperature) for body in scene.bodies), ("interface", scene.interface.temperature)]
+    loads = {f"T of {name}": load for name, load in ends if isinstance(load, Load)} | {**scene.loading}
+    # Temperatures have names of a case's own.
+    units = {name: VARIABLES[name].unit if name in VARIABLES else "K" for name in loads}
+    return [(name, load.name(), _numbers(load, units[name])) for name, load in loads.items()]
 
 
 def surface_rows(scene: Scene) -> list[tuple[str, ...]]:
@@ -276,16 +298,17 @@ def surface_rows(scene: Scene) -> list[tuple[str, ...]]:
     return [*rows, ("approach", f"{low:g} to {high:g} m", f"integrated to {surface.accuracy:g}")]
 
 
-def _numbers(law: Law) -> str:
-    """List the parameters of a law that differ from their defaults, and the lengths of its lists."""
-    found = []
+def _numbers(law: Law, x: str = "1") -> str:
+    """List what of a law differs from its defaults: parameters, names, lengths of lists; ``x`` is the loaded unit."""
+    found, specs = [], dict(law.specs())
     for item in dataclasses.fields(law):
         value = getattr(law, item.name)
-        if isinstance(value, float) and value != item.default:
-            unit = dict(law.specs())[item.name].unit
-            found.append(f"{item.name} = {value:g}{'' if unit == '1' else f' {unit}'}")
-        elif isinstance(value, Sequence) and not isinstance(value, str):
-            found.append(f"{len(value)} {item.name}")
+        size, varies = (value.value, ", varying") if isinstance(value, Varying) else (value, "")
+        if isinstance(size, float) and value != item.default and item.name in specs:
+            found.append(f"{item.name} = {size:g} {specs[item.name].resolved(x).unit}".removesuffix(" 1") + varies)
+        elif isinstance(value, tuple | list) and value:
+            named = all(isinstance(part, str) for part in value)
+            found.append(" - ".join(value) if named else f"{len(value)} {item.name}")
     return ", ".join(found)
 
 

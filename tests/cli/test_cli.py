@@ -223,6 +223,14 @@ class TestCheck:
     def test_what_is_left_to_python(self, call, arguments, told):
         assert re.search(rf"^  compiled +.*{told}", call("check", *arguments).stdout, re.MULTILINE)
 
+    def test_values_are_told_as_they_are_understood(self, call):
+        """In SI, with their units: a bare 25 is no temperature of a room."""
+        changes = ("--set", "loading.p=2 bar", "--set", "loading.Q_1=25")
+        text = call("check", "bonding.yaml", *changes).stdout
+        assert "Loads\n  p    hold  level = 200000 Pa\n  Q_1  hold  level = 25 W/m^2\nLaws\n" in text
+        assert "  bonding    linear-affinity     c_r = 6.7e+15 1/(J s)\n" in text
+        assert "  capacity   quadratic, 2 times  C = 1 J/(m^2 K)\n" in text
+
     def test_how_a_sweep_steps_is_told(self, call):
         swept = ["sweep.over={initial.T_2: [300 K, 310 K]}", "sweep.keep={last: [T_c]}"]
         text = call("check", "dna-adhesive", *(part for change in swept for part in ("--set", change))).stdout
