@@ -78,6 +78,7 @@ MISTAKES = [
     ("[lower, surroundings]", "[lower]", "15: heat.conductance.between: between needs 2 entries, got 1."),
     ("[lower, surroundings]", "lower", "15: heat.conductance.between: this must be a list, not 'lower'."),
     ("surroundings: {temperature: 300 K}\n", "", "15: heat.conductance.between: the surroundings have no temperature."),
+    ("{temperature: 300 K}", "20 degC", "16: surroundings: this must be a mapping, `{temperature: 20 degC}`, not '20"),
     ("{temperature: 300 K}", "{temperature: 0 K}", "16: surroundings.temperature: 0 K is not an absolute temperature"),
     ("loading: {v:", "loading: {w:", "17: loading: unknown key 'w'. Did you mean 'w_n'? Known: F_n, F_t, F_t2, J_c"),
     ("v: 0.1 m/s", "g_n: 5 nm/s", "g_n needs a length [m]. To change it in time, write `{ramp: {rate: 5 nm/s}}`."),
