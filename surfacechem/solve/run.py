@@ -319,25 +319,20 @@ class Trajectory:
         j = self.model.system.variable_columns.get(name)
         return [] if j is None else [table[:, j] for table in self.tables]
 
-    @property
+    @cached_property
     def tables(self) -> list[Array]:
         """States and named quantities at the output times, and at every step if any is recorded, each of shape
         (times, variables).
         """
-        steps = [self._at_steps] if self.result.steps is not None and len(self.result.steps.t) else []
-        return [self._at_outputs, *steps]
+        return [np.concatenate((self.result.outputs, self.outputs), axis=1), *self._at_steps]
 
     @cached_property
-    def _at_outputs(self) -> Array:
-        return np.concatenate((self.result.outputs, self.outputs), axis=1)
-
-    @cached_property
-    def _at_steps(self) -> Array:
+    def _at_steps(self) -> list[Array]:
         """Variables at every step, which do not depend on the outputs."""
-        steps = self.result.steps
-        assert steps is not None
+        if (steps := self.result.steps) is None or not len(steps.t):
+            return []
         named = self.model.evaluate(self.result, steps.t, steps.y, steps.ydot, steps.segment)
-        return np.concatenate((steps.y, named), axis=1)
+        return [np.concatenate((steps.y, named), axis=1)]
 
     @cached_property
     def discontinuities(self) -> Discontinuities:

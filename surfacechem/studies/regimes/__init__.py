@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -83,7 +83,7 @@ class Stops:
 
 def _varied(reference: R, read: Callable[..., Any]) -> dict[str, Any]:
     """Return the parameters of an exact solution as data, and a function for its values with other data."""
-    data = {item.name: getattr(reference, item.name) for item in fields(reference)}  # type: ignore[arg-type]
+    data = {item.name: getattr(reference, item.name) for item in reference.parameters}
     return {"data": data, "again": lambda data, *t: read(type(reference)(**data), *t)}
 
 
