@@ -266,6 +266,16 @@ def wait_for(work: Callable[[], R], tick: Callable[[], None] = lambda: None) -> 
         pool.shutdown(wait=False)
 
 
+def load_stepper(talk: bool | None = None, brief: bool = True, waits: bool = False) -> None:
+    """Say so if the stepper, or more, has to be compiled; ``brief`` loads it for few calls, without its compiler."""
+    from surfacechem.solve.radau import stepper
+
+    if brief:
+        stepper.LOOP.load_briefly()
+    if talk is not False and (waits or not stepper.LOOP.is_compiled):
+        typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
+
+
 def solve(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: bool = False) -> R:
     """Return the solution with its columns and audit computed, so that only writing is left.
 
@@ -273,17 +283,13 @@ def solve(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: b
     if more than the stepper has to be compiled. A terminal shows a progress bar after a while.
     """
     from surfacechem.cli.terminal import progress_bar
-    from surfacechem.solve.radau import stepper
 
     def whole() -> R:
         found = run()
         getattr(found, "columns", None)  # computed on first access
         return found
 
-    if brief:
-        stepper.LOOP.load_briefly()
-    if talk is not False and (waits or not stepper.LOOP.is_compiled):
-        typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
+    load_stepper(talk, brief, waits)
     with progress_bar(talk) as bar:
         bar.tell("running")
         return wait_for(whole, bar.tick)

@@ -32,6 +32,7 @@ from surfacechem.cli.commands import (
     law_names,
     leave_with,
     load_case,
+    load_stepper,
     refuse_unwritable,
     run_settings,
     solve,
@@ -191,6 +192,7 @@ def check(
         problem = model.problem(settings, values)
     except InputError as error:
         raise simulation.case.located(error) from None
+    load_stepper()
     start, end = consistent_start(model, values), settings.times[-1]
     numbers = groups(model, scene, values, start, end)
     found = [*warnings(system), *start_warnings(model, problem, start, end)]

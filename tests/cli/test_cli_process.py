@@ -77,6 +77,7 @@ def test_run_imports_only_what_it_needs(tmp_path):
     assert (tmp_path / "sliding-dry.nc").exists()
     assert {"netCDF4", "symengine"} <= found
     assert not found & {"numba", "pint", "rich", "scipy.interpolate", "scipy.optimize", "scipy.special", *HEAVY}
+    assert "numba" not in imported("from surfacechem.cli.main import app; app(['check', 'sliding-dry'])", tmp_path)
     drawn = imported("from surfacechem.cli.main import app; app(['plot', 'sliding-dry.nc'])", tmp_path)
     assert not drawn & {"surfacechem.format", "surfacechem.model", "surfacechem.solve", "symengine"}
     assert not imported("import surfacechem; surfacechem.run('sliding-dry').dataset", tmp_path) & {"dask.array", "pint"}
