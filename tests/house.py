@@ -228,7 +228,6 @@ def repeated(names: Iterator[tuple[str, str]]) -> Figure:
 
 
 @cache
-@cache
 def figures() -> dict[str, Figure]:
     """All figures by name."""
     package = modules(PACKAGE)
