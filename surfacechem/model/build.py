@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import chain, count
 from typing import Any
 
@@ -13,7 +13,7 @@ import symengine
 
 from surfacechem.contracts.terms import Friction, Law, Load, Spec, optional
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, absolute, derivative, without
+from surfacechem.expressions import Expression, absolute, derivative, where, without
 from surfacechem.model import balances
 from surfacechem.model.automaton import Constraint, Edge, Equilibrium, Mode, Register
 from surfacechem.model.balances import Node, Power, Rows
@@ -458,7 +458,8 @@ class Build:
             given = [
                 each for each in zip((">=", "<="), ends_of, told, strict=True) if each[1] not in (-math.inf, math.inf)
             ]
-            slack = NO_AMOUNT * sum(absolute(end) for _, end, _ in given)
+            size = reduce(lambda a, b: where(a > b, a, b), [absolute(end) for _, end, _ in given])
+            slack = NO_AMOUNT * size
             reason = f"{name} left the range of {law.called}, {' to '.join(told)}"
             for side, end, text in given:
                 inside = value - end + slack if side == ">=" else end + slack - value
