@@ -192,7 +192,8 @@ def check(
         problem = model.problem(settings, values)
     except InputError as error:
         raise simulation.case.located(error) from None
-    load_stepper()
+    if model.program.rates is None:  # its search finds the start
+        load_stepper()
     start, end = consistent_start(model, values), settings.times[-1]
     numbers = groups(model, scene, values, start, end)
     found = [*warnings(system), *start_warnings(model, problem, start, end)]

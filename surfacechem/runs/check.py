@@ -69,14 +69,19 @@ def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
     """Solve for rates and algebraic variables at the start; None if that breaks down."""
     system, program = model.system, model.program
     parameters = np.array([p.at(0.0) if p.load else values[p.path] for p in system.parameters])
-    given = system.initial_state(values)
-    found = consistent(program, 0.0, given, np.zeros_like(given), parameters)
-    if not found.valid:
+    y = system.initial_state(values)
+    ydot = np.zeros_like(y)
+    if program.rates is None:
+        found = consistent(program, 0.0, y, ydot, parameters)
+        y, ydot = (found.y, found.ydot) if found.valid else (y, np.full_like(y, np.nan))
+    else:  # no search, for which the stepper would have to be compiled
+        ydot = program.rates(program.filled(np.concatenate([[0.0], y, ydot, parameters])))
+    if not np.all(np.isfinite(ydot)):
         return None
-    inputs = program.filled(np.concatenate([[0.0], found.y, found.ydot, parameters]))
+    inputs = program.filled(np.concatenate([[0.0], y, ydot, parameters]))
     K, M = program.derivatives(inputs)
     outputs = dict(zip((item.name for item in system.outputs), model.output_function(inputs).tolist(), strict=True))
-    return Start(found.y, found.ydot, M, K, outputs, inputs)
+    return Start(y, ydot, M, K, outputs, inputs)
 
 
 def rates(start: Start) -> NDArray[np.complex128]:
