@@ -274,15 +274,15 @@ def test_what_a_script_changes_around_a_gas_takes_effect_at_once(change):
         ct.PressureController(gas, outside, primary=feed, K=1e-7)
         wall = ct.Wall(gas, oven, A=1e-4, U=1.0)
         net = ReactorNet([gas, InterfaceReactor("exothermic")])
-        net.advance(5.0)
+        net.advance(0.5)
         steps = net.solver_stats["steps"]
-        net.advance(5.1)
+        net.advance(0.51)
         assert net.solver_stats["steps"] >= steps
         before = gas.phase.T, *gas.phase["N2", "O2"].X
         change({"gas": gas, "source": source, "oven": oven, "feed": feed, "wall": wall})
         if anew:
             net.reinitialize()
-        net.advance(6.0)
+        net.advance(1.5)
         found.append((gas.phase.T, *gas.phase["N2", "O2"].X))
     assert found[0] == pytest.approx(found[1], rel=1e-8)
     assert found[0] != pytest.approx(before, rel=1e-5) or not gas.energy_enabled
