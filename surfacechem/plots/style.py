@@ -203,11 +203,7 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     title = wrap(str(attributes.get("title", "")), int(TITLE_PER_INCH * plot.get_figwidth())) or [""]
     plot.suptitle("\n".join(title), **TITLE_STYLE)
     facts = [str(attributes.get("reason", "")) or _ends(dataset)]
-    if (error := attribute(dataset, "error")) is not None:
-        exact = str(attributes.get("error_source", "")).startswith("exact")
-        exact = exact or any(str(name).endswith("_exact") for name in dataset)
-        kind = "exact solution" if exact else "estimate"
-        facts.append("error unknown" if np.isnan(error) else f"error {error:.1e} ({kind})")
+    facts += _error_of(dataset)
     if "solver" in attributes and (rtol := attribute(dataset, "rtol")) is not None:
         facts.append(f"{attributes['solver']}, rtol {rtol:g}")
     if "time" in dataset.sizes and dataset.sizes.get("event", 0) > dataset.sizes["time"]:
@@ -220,6 +216,20 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     more_lines = above + 10 * (len(lines) - 1) + 14 * (len(title) - 1)
     plot.set_figheight(plot.get_figheight() + more_lines / 72)  # the panels keep their height
     ax.set_title("\n".join(lines), loc="left", pad=6 + above, **NOTE_STYLE)
+
+
+def _error_of(dataset: xarray.Dataset) -> list[str]:
+    """Return the error of a run, of a sweep, or of the checked runs of a store, if one of these is told."""
+    error, kind = attribute(dataset, "error"), "of the checked runs"
+    if error is not None:
+        exact = str(dataset.attrs.get("error_source", "")).startswith("exact")
+        exact = exact or any(str(name).endswith("_exact") for name in dataset)
+        kind = "(exact solution)" if exact else "(estimate)"
+    elif "checked_error" in dataset:
+        error = float(np.fmax.reduce([*dataset["checked_error"].values, *dataset["hardest_error"].values]))
+    else:
+        return []
+    return ["error unknown" if np.isnan(error) else f"error {error:.1e} {kind}"]
 
 
 WITHOUT_END, STOPPED = ("failed", "refused"), "stopped"

@@ -228,6 +228,18 @@ def test_runs_that_failed_or_were_refused_are_told_and_in_no_line(whole, tmp_pat
     assert (failed.get_xdata().tolist(), failed.get_label()) == ([100, 300], "failed")
 
 
+def test_a_figure_of_a_store_tells_the_error_of_its_checked_runs(tmp_path):
+    """What differs by less than that is no result."""
+    sweep = {"over": {"initial.T": [300.0, 310.0]}, "keep": {"last": ["T"]}}
+    simulation = surfacechem.load("exothermic", {"run.rtol": 1e-5, "sweep": sweep})
+    stream = simulation.stream(simulation.plan(), tmp_path / "o.zarr")
+    with stream.run().dataset as data:
+        assert "error unknown" in plots.figure(data).axes[0].get_title("left")
+    checked = stream.check()
+    with stream.store.dataset as data:
+        assert f"error {checked.error:.1e} of the checked runs" in plots.figure(data).axes[0].get_title("left")
+
+
 def test_ends_are_those_of_the_runs_also_where_they_stop_between_outputs(tmp_path):
     over = {"loading.Q_1": [-100.0, -50.0, -20.0]}
     case = surfacechem.load("cooling-to-zero", {"run.outputs": 5, "sweep": {"over": over, "keep": {"series": ["T"]}}})
