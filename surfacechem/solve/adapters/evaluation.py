@@ -131,14 +131,15 @@ class Evaluations:
         states, ydot = rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n]
         if program.rates is not None:
             ydot[:] = program.rates(rows)
-            found = np.isfinite(ydot).all(axis=1)
+            found = np.isfinite(ydot)
         else:
             ends, counts = rows[:, : 1 + 2 * n].copy(), np.zeros((len(rows), COLUMNS), np.int64)
             table = np.ascontiguousarray(rows[:, None, 1 + 2 * n :])
             stepper.run(search_batch(program, ends, table, counts))
             rows[:, : 1 + 2 * n], found = ends, counts[:, END] == 0
         if not found.all():
-            states[~found] = ydot[~found] = np.nan
+            lost = ~found.reshape(len(rows), -1).all(axis=1)
+            states[lost] = ydot[lost] = np.nan
         ledger, margins = (
             function(rows) if function else np.zeros((len(rows), 0)) for function in (program.ledger, program.margins)
         )
