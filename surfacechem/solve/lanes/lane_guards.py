@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.lanes.lane_step import larger, put_end, put_inside, smaller
-from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
+from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, put_where, same, where
 from surfacechem.solve.radau.explicit import DENSEST
 from surfacechem.solve.radau.guards import is_limit
 from surfacechem.solve.radau.tables import SCANNED
@@ -32,10 +32,10 @@ def start_margins(w: Any, fresh: Any) -> None:
         value, largest = lanes(w.margin[m]), lanes(w.margin_largest[m])
         largest = where(fresh, larger(largest, absolute(value)), largest)
         put(w.margin_largest[m], largest)
-        put(w.margin_first[m], where(fresh, value, lanes(w.margin_first[m])))
+        put_where(fresh, w.margin_first[m], value)
         clear = (absolute(value) > FORMULA_EPS * largest) & (lanes(w.fired[m]) < 0.5)
         side = where(clear, where(value > 0.0, 1.0, -1.0), 0.0)
-        put(w.side[m], where(fresh, side, lanes(w.side[m])))
+        put_where(fresh, w.side[m], side)
         if w.kinds[m, 4] == 0:
             put(w.side[m], 0.0)
         elif is_limit(w, m):
@@ -125,11 +125,11 @@ def _scan(w: Any, searched: Any) -> None:
                 continue
             crossed = searched & _crosses(w, m)
             found = where(crossed, 1.0, found)
-            put(w.fired[m], where(searched, where(crossed, 1.0, 0.0), lanes(w.fired[m])))
+            put_where(searched, w.fired[m], where(crossed, 1.0, 0.0))
             if before > 0.0:
-                put(w.unclear, where(searched & _dips(w, m, earlier, before, x), 1.0, lanes(w.unclear)))
-        put(w.low, where(found > 0.5, before, lanes(w.low)))
-        put(w.high, where(found > 0.5, x, lanes(w.high)))
+                put_where(searched & _dips(w, m, earlier, before, x), w.unclear, 1.0)
+        put_where(found > 0.5, w.low, before)
+        put_where(found > 0.5, w.high, x)
         searched = searched & (found < 0.5)
         if not any_lane(searched):
             break
@@ -139,9 +139,9 @@ def _scan(w: Any, searched: Any) -> None:
             put(w.margin_largest[m], largest)
             leaves = searched & (side == 0.0) & (absolute(value) > FORMULA_EPS * largest)
             if w.kinds[m, 4] != 0:
-                put(w.side[m], where(leaves, where(value > 0.0, 1.0, -1.0), side))
+                put_where(leaves, w.side[m], where(value > 0.0, 1.0, -1.0))
                 if is_limit(w, m):
-                    put(w.unclear, where(leaves & (value < 0.0), 1.0, lanes(w.unclear)))
+                    put_where(leaves & (value < 0.0), w.unclear, 1.0)
         earlier, before = before, x
 
 
@@ -188,7 +188,7 @@ def _locate(w: Any, crossing: Any) -> None:
         low, high = where(wide & ~across, x, low), where(wide & across, x, high)
     width = CBRT_EPS * larger(high, RUN_EPS)
     rise = _nearest_inside(w, high + width) - _nearest_inside(w, high - width)
-    put(w.slope, where(crossing, rise / (2.0 * width * lanes(w.h)), lanes(w.slope)))
+    put_where(crossing, w.slope, rise / (2.0 * width * lanes(w.h)))
     put(w.crossing, where(crossing, high, 1.0))
 
 
@@ -202,7 +202,7 @@ def find_crossings(w: Any, good: Any, close: Any) -> None:
     for m in range(w.n_margins):
         if w.kinds[m, 4] != 0:
             largest = lanes(w.margin_largest[m])
-            put(w.margin_largest[m], where(whole, larger(largest, absolute(lanes(w.margin_end[m]))), largest))
+            put_where(whole, w.margin_largest[m], larger(largest, absolute(lanes(w.margin_end[m]))))
     close = close & good
     put(w.high, 0.0)
     if any_lane(close):
@@ -213,7 +213,7 @@ def find_crossings(w: Any, good: Any, close: Any) -> None:
         _locate(w, crossing)
     for m in range(w.n_margins):
         put(w.margin[m], lanes(w.margin_end[m]))
-    put(w.value, where(landing, _nearest(w), lanes(w.value)))
+    put_where(landing, w.value, _nearest(w))
 
 
 @compiled

@@ -22,7 +22,7 @@ from surfacechem.solve.lanes.lane_step import (
     smaller,
 )
 from surfacechem.solve.lanes.layout import EXPLICIT_MEMORY, NUMBERS, ORDER, SIZES
-from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, same, where
+from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, put_where, same, where
 from surfacechem.solve.radau.driver import FEWEST_CHECKS, LEAST_NORM
 from surfacechem.solve.radau.explicit import STIFF_STEPS
 from surfacechem.solve.radau.record import StepperRecord, laying_out
@@ -75,12 +75,14 @@ def _end(w: Any, lane: int, status: int) -> None:
     for k, counter in enumerate(counters):
         counts[FIRST_COUNTER + k] = counter
     w.over[lane] = i
+    w.ended += 1
     _leave(w, lane)
 
 
 @compiled
 def _leave(w: Any, lane: int) -> None:
-    w.run[lane], w.next_output[lane], w.busy[lane] = -1, np.inf, 0.0
+    w.run[lane], w.next_output[lane], w.busy[lane], w.fresh[lane] = -1, np.inf, 0.0, 0.0
+    w.free += 1
 
 
 @compiled
@@ -106,6 +108,7 @@ def _enter(w: Any, lane: int) -> None:
 def _begin(w: Any, lane: int, i: int) -> None:
     """Begin run i in a lane."""
     w.run[lane], w.segment[lane], w.busy[lane], w.most_steps[lane] = i, 0, 1.0, w.max_steps[row_of(w.max_steps, i)]
+    w.free -= 1
     w.steps[lane] = w.rejected[lane] = w.failed[lane] = w.stiff_steps[lane] = w.landing[lane] = 0.0
     w.evaluations[lane] = 0.0
     peaks = w.peaks[row_of(w.peaks, i)]
@@ -148,21 +151,19 @@ def _start(w: Any) -> None:
     put_start(w)
     evaluate(w, RATES, w.rates)
     for m in range(w.columns):
-        put(w.k[0, m], where(fresh, lanes(w.rates[m]), lanes(w.k[0, m])))
+        put_where(fresh, w.k[0, m], lanes(w.rates[m]))
     put(w.unclear, 0.0)
     if w.n_margins > 0:
         start_margins(w, fresh)
     set_weights(w)
-    put(w.proposed, where(fresh, _first_sizes(w), lanes(w.proposed)))
-    put(w.aim, where(fresh, np.inf, lanes(w.aim)))
-    put(w.h_last, where(fresh, 0.0, lanes(w.h_last)))
+    put_where(fresh, w.proposed, _first_sizes(w))
+    put_where(fresh, w.aim, np.inf)
+    put_where(fresh, w.h_last, 0.0)
     for lane in range(LANES):
         i = w.run[lane]
-        if w.fresh[lane] < 0.5 or i < 0:
+        if w.fresh[lane] < 0.5:
             continue
-        for r in range(1 + 2 * w.n, w.n_inputs):
-            put(w.inside[lane, r], w.inputs[r, lane])
-        w.fresh[lane], w.begins[lane], w.again[lane], w.failed[lane] = 0.0, 1.0, 0.0, 0
+        w.fresh[lane], w.begins[lane], w.again[lane], w.failed[lane], w.spread[lane] = 0.0, 1.0, 0.0, 0, 0.0
         for m in range(w.n_margins):
             w.fired[m, lane] = 0.0
         if w.unclear[lane] > 0.5:
@@ -244,35 +245,29 @@ def _write_events(w: Any, lane: int) -> bool:
 
 
 @compiled
-def _take(w: Any, row: Any, values: Any) -> None:
-    """Store values in the lanes whose steps are accepted."""
-    put(row, where(lanes(w.taken) > 0.5, values, lanes(row)))
-
-
-@compiled
 def _move_on(w: Any) -> None:
     """Move the lanes whose steps are accepted to the ends of these steps."""
     w.keep_step(w)
-    t_new = lanes(w.t_new)
+    taken, t_new = lanes(w.taken) > 0.5, lanes(w.t_new)
     for m in range(w.columns):
-        _take(w, w.y[m], lanes(w.y_new[m]))
-        _take(w, w.k[0, m], lanes(w.k[w.end_stage, m]))
+        put_where(taken, w.y[m], lanes(w.y_new[m]))
+        put_where(taken, w.k[0, m], lanes(w.k[w.end_stage, m]))
     for m in range(w.n_margins):
-        _take(w, w.margin_first[m], lanes(w.margin_end[m]))
+        put_where(taken, w.margin_first[m], lanes(w.margin_end[m]))
     for m in range(w.n_ledger):
         put(w.q_largest[m], larger(absolute(lanes(w.y[w.n + m])), lanes(w.q_largest[m])))
-    _take(w, w.t, t_new)
+    put_where(taken, w.t, t_new)
     for flag in (w.begins, w.again, w.failed):
-        _take(w, flag, same(0.0))
-    _take(w, w.steps, lanes(w.steps) + 1.0)
+        put_where(taken, flag, 0.0)
+    put_where(taken, w.steps, lanes(w.steps) + 1.0)
     stiff_steps = lanes(w.stiff_steps)
     fewer = larger(stiff_steps - 1.0, same(0.0))
-    _take(w, w.stiff_steps, where(lanes(w.stiff) > 0.5, stiff_steps + 2.0, fewer))
+    put_where(taken, w.stiff_steps, where(lanes(w.stiff) > 0.5, stiff_steps + 2.0, fewer))
     # An error far below the tolerance tells the controller nothing more.
-    _take(w, w.h_last, lanes(w.h))
-    _take(w, w.root_last, larger(lanes(w.root), w.least_root))
-    _take(w, w.proposed, lanes(w.following))
-    _take(w, w.aim, where(t_new >= lanes(w.aim), np.inf, lanes(w.aim)))
+    put_where(taken, w.h_last, lanes(w.h))
+    put_where(taken, w.root_last, larger(lanes(w.root), w.least_root))
+    put_where(taken, w.proposed, lanes(w.following))
+    put_where(taken, w.aim, where(t_new >= lanes(w.aim), np.inf, lanes(w.aim)))
 
 
 @compiled
@@ -327,9 +322,11 @@ def _conclude(w: Any, lane: int) -> None:
 
 
 @compiled
-def _put_pending(w: Any, pending: Any) -> None:
-    """Mark the lanes of a mask in which something is to be done one by one."""
-    put(w.pending, where(pending & (lanes(w.busy) > 0.5), 1.0, 0.0))
+def _are_pending(w: Any, pending: Any) -> bool:
+    """Mark the lanes of a mask in which something is to be done one by one; True if there are any."""
+    pending = pending & (lanes(w.busy) > 0.5)
+    put(w.pending, where(pending, 1.0, 0.0))
+    return bool(any_lane(pending))
 
 
 @compiled
@@ -338,8 +335,7 @@ def _conclude_all(w: Any) -> None:
     usual = (lanes(w.norm) < 1.0) & (lanes(w.defect_at) == 1.0) & (lanes(w.crossing) == 1.0) & (lanes(w.onto) < 0.5)
     usual = usual & ~(lanes(w.next_output) <= lanes(w.t_new)) & (lanes(w.again) < 0.5)
     put(w.taken, where(usual, lanes(w.busy), 0.0))
-    _put_pending(w, ~usual)
-    for lane in range(LANES):
+    for lane in range(LANES if _are_pending(w, ~usual) else 0):
         if w.pending[lane] > 0.5:
             _conclude(w, lane)
 
@@ -359,13 +355,11 @@ def _continue_all(w: Any) -> None:
     """Go on after the steps: where one ends at an event, a segment or the run; where a run is given up."""
     taken = lanes(w.taken) > 0.5
     ends = (lanes(w.t) == lanes(w.end)) | (lanes(w.landing) > 0.5)
-    _put_pending(w, taken & (ends if w.records.shape[1] == 0 else taken))
-    for lane in range(LANES):
+    for lane in range(LANES if _are_pending(w, taken & (ends if w.records.shape[1] == 0 else taken)) else 0):
         if w.pending[lane] > 0.5:
             _record(w, lane)
             _go_on(w, lane)
-    _put_pending(w, _doubtful(w))
-    for lane in range(LANES):
+    for lane in range(LANES if _are_pending(w, _doubtful(w)) else 0):
         if w.pending[lane] > 0.5:
             _give_up(w, lane)
 
@@ -373,11 +367,9 @@ def _continue_all(w: Any) -> None:
 @compiled
 def _write_margins(w: Any) -> None:
     """Write the guards of runs that have just ended."""
-    ended = False
-    for lane in range(LANES):
-        ended = ended or w.over[lane] >= 0
-    if not ended:
+    if w.ended == 0:
         return
+    w.ended = 0
     if w.n_margins > 0:
         put_start(w)
         evaluate(w, MARGINS, w.margin)
@@ -429,28 +421,20 @@ def run_through(w: Any, first: int, last: int) -> None:
     threads.
     """
     w.loose = loosening(w.rtol)
-    following, busy = first, 0
+    following = first
     for lane in range(LANES):
         w.over[lane] = -1
         _leave(w, lane)
-    while busy > 0 or following < last:
+    while w.free < LANES or following < last:
         # Runs begin together, so that several share each evaluation at starts and ends.
-        begins = busy <= LANES - FREE_LANES
-        starts, busy = False, 0
-        for lane in range(LANES):
-            if begins and w.run[lane] < 0 and following < last:
+        for lane in range(LANES if w.free >= FREE_LANES else 0):
+            if w.run[lane] < 0 and following < last:
                 _begin(w, lane, following)
                 following += 1
-            starts = starts or (w.run[lane] >= 0 and w.fresh[lane] > 0.5)
-        if starts:
+        if any_lane(lanes(w.fresh) > 0.5):
             _start(w)
-        for lane in range(LANES):
-            busy += w.run[lane] >= 0
-        if busy > 0:
+        if w.free < LANES:
             _step(w)
-            busy = 0
-            for lane in range(LANES):
-                busy += w.run[lane] >= 0
 
 
 _METHOD = {

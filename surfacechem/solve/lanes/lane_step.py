@@ -122,9 +122,12 @@ def norm_of(w: Any, row: Any) -> Any:
 
 
 @compiled
-def _evaluate_stage(w: Any, i: int, columns: int, change: Any) -> None:
-    """Evaluate the rates of stage i, and the weighted sum of the earlier stages for the first ``columns`` columns."""
-    h = lanes(w.h)
+def _evaluate_stage(w: Any, i: int) -> None:
+    """Evaluate the rates of stage i, and the weighted sum of the earlier stages: of the accounts at the end alone."""
+    h, columns, change = lanes(w.h), w.columns if i == END_STAGE else w.n, w.change
+    if i >= END_STAGE - 1:
+        # What the last two stages have is kept.
+        change = w.change_before if i < END_STAGE else change if i == END_STAGE else w.rates
     _change(i, w.k.ctypes.data, LANES * w.columns, LANES * columns, change.ctypes.data)
     put(w.inputs[0], lanes(w.t) + EXPLICIT_NODES[i] * h)
     for m in range(w.n):
@@ -165,9 +168,8 @@ def _ledger_norms(w: Any) -> Any:
 @compiled
 def try_step(w: Any) -> None:
     """Evaluate all stages of a step of each lane, and the norm of its local error."""
-    for i in range(1, END_STAGE):
-        _evaluate_stage(w, i, w.n, w.change_before if i == END_STAGE - 1 else w.change)
-    _evaluate_stage(w, END_STAGE, w.columns, w.change)
+    for i in range(1, END_STAGE + 1):
+        _evaluate_stage(w, i)
     put(w.evaluations, lanes(w.evaluations) + float(LAST_STAGE))
     h, every = lanes(w.h), LANES * w.columns
     _errors(0, w.k.ctypes.data, every, every, w.coarse.ctypes.data)
@@ -230,7 +232,7 @@ def is_noise(w: Any, lane: int) -> bool:
 def interpolate(w: Any, columns: int) -> None:
     """The polynomials of the steps, of the first so many columns."""
     for i in range(STAGES_OF_DENSE, LAST_STAGE + 1):
-        _evaluate_stage(w, i, w.n, w.rates)
+        _evaluate_stage(w, i)
     for d in range(ORDER):
         _coefficients(d, w.k.ctypes.data, LANES * w.columns, LANES * columns, w.polynomial[d].ctypes.data)
 
@@ -295,6 +297,10 @@ def _prepare_checks(w: Any) -> None:
 def put_points(w: Any, lane: int, x: Any) -> None:
     """Set the inputs inside to time and state of a lane at eight fractions x of its step."""
     h, inputs = w.h[lane], w.inside[lane]
+    if w.spread[lane] < 0.5:
+        w.spread[lane] = 1.0
+        for r in range(1 + 2 * w.n, w.n_inputs):
+            put(inputs[r], w.inputs[r, lane])
     put(inputs[0], w.t[lane] + x * h)
     for m in range(w.n):
         put(inputs[1 + m], w.y[m, lane] + h * x * polynomial_of(w.polynomial, m, lane, x))

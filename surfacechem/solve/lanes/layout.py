@@ -10,8 +10,8 @@ SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "columns")
 ORDER = 7
 """Order of the dense output of a step, and number of coefficients of its polynomial."""
 
-NUMBERS = {"loose": float}
-"""Scalars that change."""
+NUMBERS = {"loose": float, "free": int, "ended": int}
+"""Scalars that change: loosening of the estimates, lanes without a run, runs that end in a step."""
 
 
 def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tuple[type, tuple[str | int, ...]]]:
@@ -51,8 +51,9 @@ MEMORY = {
     # evaluations of the equations
     **_arrays("evaluations"),
     # flags: a start or restart; the first step of a segment, the last one; a step onto a guard; one that is repeated;
-    # one that is stiff; guards of which it is unclear whether they are met; a step that is taken
-    **_arrays("fresh begins last onto again stiff unclear taken"),
+    # one that is stiff; guards of which it is unclear whether they are met; a step that is taken; parameters that are
+    # inside, too
+    **_arrays("fresh begins last onto again stiff unclear taken spread"),
     # whether a lane has a run, and whether something is to be done for it alone; its steps, rejected ones, those in a
     # row, most of both; twice the stiff ones; trials of a step onto a guard
     **_arrays("busy pending steps rejected failed most_steps stiff_steps landing"),

@@ -39,6 +39,7 @@ from surfacechem.solve.lanes.vector import (
     polynomial,
     polynomial_of,
     put,
+    put_where,
     same,
     square_root,
     where,
@@ -141,8 +142,8 @@ def _exchange(re: Any, im: Any, flags: Any, k: int) -> None:
             for j in range(k, re.shape[0]):
                 for part in (re, im):
                     upper, lower = lanes(part[k, j]), lanes(part[i, j])
-                    put(part[k, j], where(moves, lower, upper))
-                    put(part[i, j], where(moves, upper, lower))
+                    put_where(moves, part[k, j], lower)
+                    put_where(moves, part[i, j], upper)
 
 
 @compiled
@@ -190,8 +191,8 @@ def solve(w: Any, s: int, x: Any, y: Any) -> None:
             if any_lane(moves):
                 for part in (x, y):
                     upper, lower = lanes(part[k]), lanes(part[i])
-                    put(part[k], where(moves, lower, upper))
-                    put(part[i], where(moves, upper, lower))
+                    put_where(moves, part[k], lower)
+                    put_where(moves, part[i], upper)
         a, b = lanes(x[k]), lanes(y[k])
         for i in range(k + 1, n):
             c, d = lanes(re[i, k]), lanes(im[i, k])
@@ -401,7 +402,7 @@ def _error_norm(w: Any) -> Any:
         evaluate(w, RESIDUAL, w.rates)
         _estimate(w, w.rates)
         for m in range(w.n):
-            put(w.error[m], where(again, lanes(w.rhs[m]), lanes(w.error[m])))
+            put_where(again, w.error[m], lanes(w.rhs[m]))
         norm = where(again, smaller(norm, _norm_of_error(w)), norm)
     return norm
 
@@ -502,7 +503,7 @@ def _propose_by_order(w: Any) -> None:
     if any_lane(fails):
         inverse = logarithm(lanes(w.h_tried) / lanes(w.h)) / logarithm(before / norm)
         size = lanes(w.h) * larger(SAFETY * exponential(0.0 - inverse * logarithm(norm)), same(MIN_GROWTH))
-        put(w.following, where(fails, smaller(size, lanes(w.following)), lanes(w.following)))
+        put_where(fails, w.following, smaller(size, lanes(w.following)))
 
 
 @compiled
@@ -594,7 +595,7 @@ def check_outputs(w: Any, good: Any) -> None:
     for m in range(w.n):
         serves = serves & (absolute(lanes(w.rhs[m])) <= POLYNOMIAL_ERROR * lanes(w.weight[m]))
     until = (lanes(w.next_output) - lanes(w.t)) / lanes(w.h)
-    put(w.defect_at, where(shown & ~serves, until, lanes(w.defect_at)))
+    put_where(shown & ~serves, w.defect_at, until)
 
 
 @compiled
@@ -603,7 +604,7 @@ def keep_step(w: Any) -> None:
     taken = lanes(w.taken) > 0.5
     for i in range(STAGES):
         for m in range(w.n):
-            put(w.k_last[i, m], where(taken, lanes(w.k[1 + i, m]), lanes(w.k_last[i, m])))
+            put_where(taken, w.k_last[i, m], lanes(w.k[1 + i, m]))
 
 
 _METHOD = {

@@ -126,6 +126,23 @@ def put(_context: Any, row: Any, values: Any) -> Any:
 
 
 @_intrinsic
+def put_where(_context: Any, mask: Any, row: Any, values: Any) -> Any:
+    """Store numbers in the entries of a row where the mask holds; the others stay."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        value = args[2] if signature.args[2] is LANE else _spread(builder, args[2])
+        place = _row(context, builder, signature.args[1], args[1])
+        chosen = builder.select(_holds(builder, args[0]), value, builder.load(place, align=8))
+        # Hide from the optimiser that both places are one: a store by mask, which it would form, takes many times as
+        # long on processors without mask registers.
+        same_place = builder.asm(ir.FunctionType(place.type, [place.type]), "", "=r,0", [place], False)
+        builder.store(chosen, same_place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(mask, row, values), generate
+
+
+@_intrinsic
 def where(_context: Any, mask: Any, a: Any, b: Any) -> Any:
     """Select by lane: the first value where the mask holds, else the second."""
 
