@@ -119,6 +119,11 @@ class Guards:
         across = np.where(self.strict, now < -FORMULA_EPS * self.largest, now * self.sides <= 0.0)
         return across & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
 
+    def at_zero(self, active: NDArray[np.bool_]) -> list[int]:
+        """Return the kinks that have come to zero within roundoff, in a direction that counts."""
+        counts = active & ~self.limits & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
+        return np.flatnonzero(counts & (np.abs(self.now) <= FORMULA_EPS * self.largest)).tolist()
+
     def fallen(self, now: Array) -> NDArray[np.bool_]:
         """Return a mask of the due guards that have fallen to these values."""
         return self.due & (self._change_of_due(now) < -FORMULA_EPS * self.largest)

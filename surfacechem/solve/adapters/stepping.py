@@ -2,7 +2,7 @@
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -225,6 +225,8 @@ class _Run:
         self.active = np.array((True,) * program.n_margins if problem.active is None else problem.active, bool)
         self.outputs: list[Array] = []
         self.fired: list[int] = []
+        self.restarts: list[int] = []
+        """Margins that fire at the present time."""
         self.events: list[tuple[Array, Array, Array, Array]] = []
         """Times, states, rates and ledgers at events, whose margins are in ``fired``."""
         self.steps: list[tuple[Array, Array, Array, Array]] = []
@@ -241,7 +243,6 @@ class _Run:
 
     def through_segment(self, end: float) -> Status:
         """Integrate to the end of a segment, restarting the library after each event."""
-        fired: list[int] = []
         while self.t < end:
             start = self.t
             y, ydot = self.view.complete(start, self.y[self.view.differential])
@@ -250,7 +251,7 @@ class _Run:
             self.y, self.ydot = y, ydot
             self.view.hold(start, y, ydot)
             self.margins, self.ledger_rates = self.view.margins(), self.view.ledger()
-            self.guards.start(self.margins, fired)
+            self.guards.start(self.margins, self.restarts)
             if not self.outputs and len(self.problem.times) and self.problem.times[0] <= start:
                 self.outputs.append(np.concatenate((self.y, self.ledger)))
             if self.problem.record_steps and not self.steps:
@@ -258,12 +259,12 @@ class _Run:
             stop = end if self.aim is None or self.aim <= start else self.aim
             method = self.solver.begin(self.view, start, stop, self.y, self.ydot)
             try:
-                fired = self._to_event(method, stop)
+                self.restarts = self._to_event(method, stop)
             finally:
                 self.factorizations += method.factorizations
                 self.jacobians += method.own_jacobians
                 self.rejected += method.rejected
-            if any(self.problem.margins[i].terminal for i in fired):
+            if any(self.problem.margins[i].terminal for i in self.restarts):
                 return Status.EVENT
             over = self._over_budget()
             if over is not None and self.t < end:
@@ -317,6 +318,9 @@ class _Run:
         # Simultaneous zeros differ by the error of the library's polynomial.
         resolution = min(self.problem.rtol, SQRT_EPS) * (within.end - self.t) + ULPS * abs(within.end)
         reached, fired = first_crossing(within, self.guards, self.active, resolution)
+        if reached == end and (self.problem.continued or end < self.problem.segments[-1]):
+            # The next segment cannot tell on which side of zero a kink was.
+            fired = fired or self.guards.at_zero(self.active)
         if reached < within.end:
             inside = self._inside(Steps.of([step]), reached)
         if fired and self.aim is None and not self._adds_up(inside, MAX_DEFECT)[0]:
@@ -325,7 +329,7 @@ class _Run:
         self._accept(lambda _: step, inside, fired)
         return fired or None
 
-    def _accept(self, step: Callable[[int], DenseStep], inside: _Inside, fired: Iterable[int] = ()) -> None:
+    def _accept(self, step: Callable[[int], DenseStep], inside: _Inside, fired: Sequence[int] = ()) -> None:
         """Move on to the end of these steps, and store their outputs and events."""
         times, y, ydot = inside.times, inside.y.ends, inside.ydot.ends
         gains = inside.ledger.integral(inside.sizes)
@@ -345,9 +349,8 @@ class _Run:
         self.count += len(y)
         if self.problem.record_steps:
             self.steps.append((times[1:], y, ydot, ledgers[1:]))
-        for i in fired:
-            self.fired.append(i)
-            self.events.append((times[-1:], y[-1:], ydot[-1:], ledgers[-1:]))
+        self.fired += fired
+        self.events += [(times[-1:], y[-1:], ydot[-1:], ledgers[-1:])] * len(fired)
 
     def _write_outputs(
         self, step: Callable[[int], DenseStep], inside: _Inside, ledgers: Array, relied: NDArray[np.bool_]
@@ -394,10 +397,9 @@ class _Run:
     def _state(self, step: DenseStep, t: float) -> tuple[Array, Array]:
         """Return state and derivatives inside the last step."""
         x = step.y(t)
-        if not self.solver.keeps_algebraic:
-            return self.view.complete(t, x)
-        self.view.guess = x[self.view.algebraic]
-        return self.view.complete(t, x[self.view.differential])
+        if self.solver.keeps_algebraic:
+            self.view.guess, x = x[self.view.algebraic], x[self.view.differential]
+        return self.view.complete(t, x)
 
     def _guards(self, t: float, x: Array) -> Array:
         """Return the margins from the library's variables, finding other variables only if margins need them."""
