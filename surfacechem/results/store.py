@@ -45,6 +45,7 @@ SHARED_ATTRIBUTES = {
     "mechanism": "the mechanism",
     "sweep": "the plan",
     "keep": "what is kept",
+    "changes": "the changes",
     "run": "the settings of the run",
     "check": "what is checked",
     "versions": "the versions",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, cached_property, partial
+from functools import cache, partial
 from typing import Any, NoReturn, Self
 
 import cantera
@@ -18,7 +18,7 @@ from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.solve.adapters.dense_step import DenseStep, Steps, at_nodes, hermite, on_step
 from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
-from surfacechem.solve.contract import Array
+from surfacechem.solve.contract import Array, Counters
 from surfacechem.tolerances import FORMULA_EPS, TINY
 
 NAMES = ("cantera",)
@@ -309,22 +309,14 @@ class _Stretch(Method):
         gained = partial(on_step, end, end - start, rows[k][:, n:]) if rows.shape[2] > n else None
         return DenseStep(start, end, y, y, gained)
 
-    @cached_property
-    def _stats(self) -> dict[str, Any]:
-        """Counts of the integrator, for which it is asked once it has taken its last step."""
-        return self.net.solver_stats
-
     @property
-    def factorizations(self) -> int:
-        return int(self._stats["lin_solve_setups"])
-
-    @property
-    def own_jacobians(self) -> int:
-        return int(self._stats["jac_evals"])
-
-    @property
-    def rejected(self) -> int:
-        return int(self._stats["err_test_fails"] + self._stats["nonlinear_conv_fails"])
+    def counters(self) -> Counters:
+        told = self.net.solver_stats
+        return Counters(
+            rejected=int(told["err_test_fails"] + told["nonlinear_conv_fails"]),
+            jacobians=int(told["jac_evals"]),
+            factorizations=int(told["lin_solve_setups"]),
+        )
 
 
 class CanteraSolver(SteppingSolver):

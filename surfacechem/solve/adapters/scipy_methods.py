@@ -8,7 +8,7 @@ from scipy.integrate import BDF, LSODA, OdeSolver, Radau
 
 from surfacechem.solve.adapters.dense_step import DenseStep, Steps
 from surfacechem.solve.adapters.stepping import Method, NoStateError, StepError, SteppingSolver, View
-from surfacechem.solve.contract import Array
+from surfacechem.solve.contract import Array, Counters
 from surfacechem.tolerances import EPS
 
 NAMES = ("lsoda", "bdf", "scipy-radau")
@@ -70,8 +70,8 @@ class _Stretch(Method):
             raise StepError(str(message))
 
     @property
-    def factorizations(self) -> int:
-        return int(self.solver.nlu)
+    def counters(self) -> Counters:
+        return Counters(factorizations=int(self.solver.nlu))
 
 
 class SciPySolver(SteppingSolver):

@@ -106,19 +106,9 @@ class Method(ABC):
         return Steps.of([self.advance()])
 
     @property
-    def factorizations(self) -> int:
-        """Matrices factored so far; 0 if the library does not report them."""
-        return 0
-
-    @property
-    def own_jacobians(self) -> int:
-        """Jacobians that the library has formed by itself so far."""
-        return 0
-
-    @property
-    def rejected(self) -> int:
-        """Steps rejected so far, for a solver that counts them."""
-        return 0
+    def counters(self) -> Counters:
+        """Matrices factored, Jacobians formed and steps rejected so far, where the library tells."""
+        return Counters()
 
 
 class SteppingSolver(Solver):
@@ -261,9 +251,10 @@ class _Run:
             try:
                 self.restarts = self._to_event(method, stop)
             finally:
-                self.factorizations += method.factorizations
-                self.jacobians += method.own_jacobians
-                self.rejected += method.rejected
+                told = method.counters
+                self.factorizations += told.factorizations
+                self.jacobians += told.jacobians
+                self.rejected += told.rejected
             if any(self.problem.margins[i].terminal for i in self.restarts):
                 return Status.EVENT
             over = self._over_budget()
