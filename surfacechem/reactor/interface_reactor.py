@@ -145,8 +145,12 @@ class InterfaceReactor(StateVectorReactor):
 
     def _set_scene(self, scene: EmbeddedScene) -> None:
         self.scene = scene
-        self.names = (*scene.states, *(f"{account} / {LEDGER_UNIT:g}" for account in scene.accounts))
-        self.unit = np.array([1.0] * len(scene.states) + [LEDGER_UNIT] * len(scene.accounts))
+        states = [scene.model.system.states[j] for j in scene.evaluation.free]
+        # Of a turn, in radians, the absolute error counts: its scale is large.
+        units = [1.0 if state.is_temperature else max(state.scale, 1.0) for state in states]
+        self.unit = np.array(units + [LEDGER_UNIT] * len(scene.accounts))
+        named = zip((*scene.states, *scene.accounts), self.unit.tolist(), strict=True)
+        self.names = tuple(name if unit == 1 else f"{name} / {unit:g}" for name, unit in named)
         self.x = scene.start()
         self.ledger = self.x[len(scene.states) :].copy()
         self.booked_at = self.x

@@ -49,9 +49,8 @@ def case(name="exothermic", keep=None, over=None, **more):
 
 def stored(path, simulation=None, **options):
     simulation = simulation or case(keep=ENDS)
-    stream = simulation.stream(
-        simulation.plan(), path, resume=options.pop("resume", False), part=options.pop("part", (1, 1))
-    )
+    given = {name: options.pop(name) for name in ("changes", "resume", "part") if name in options}
+    stream = simulation.stream(simulation.plan(), path, **given)
     return stream.run(options.pop("threads", 1), **options)
 
 
@@ -350,9 +349,8 @@ def test_another_sweep_or_what_is_no_store_is_refused(whole, tmp_path):
         stored(whole, case(keep={"last": ["T"]}), resume=True)
     with pytest.raises(InputError, match=r"belongs to another sweep\. Different: the case, the plan\."):
         stored(whole, case(keep=ENDS, over={K_0: [1.0, 2.0]}), resume=True)
-    simulation = case(keep=ENDS)
     with pytest.raises(InputError, match=r"belongs to another sweep\. Different: the changes\."):
-        simulation.stream(simulation.plan(), whole, {"initial.T": 310.0}, resume=True)
+        stored(whole, changes={"initial.T": 310.0}, resume=True)
     (tmp_path / "foreign.zarr").mkdir()
     (tmp_path / "foreign.zarr" / "zarr.json").write_text("{}")
     with pytest.raises(InputError, match="is no store of a sweep"):
