@@ -309,7 +309,7 @@ def _shortest(expression: Expression) -> Expression:
         if whole.is_rational_function():
             over, under = sympy.fraction(sympy.cancel(sympy.together(whole)))
             forms += [sympy.expand(whole), *(sympy.collect(over, x, sympy.factor) / under for x in over.free_symbols)]
-        else:
+        elif not whole.has(sympy.sin):  # a search of minutes that finds nothing
             forms.append(sympy.simplify(whole))
     return symengine.sympify(min(forms, key=sympy.count_ops))
 
