@@ -2,14 +2,14 @@
 
 import csv
 import re
-import runpy
 import tomllib
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import execution
 import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -24,6 +24,12 @@ from surfacechem import plots
 BLUE, RED, GREEN, PINK = plots.COLOURS[:4]
 
 
+def on_config(config: Any) -> Any:
+    """Let pages of notebooks have what these gave in this process."""
+    execution.install()
+    return config
+
+
 def on_files(files: Files, config: Any) -> Files:
     """Add the figures to the pages' files."""
     for name, make in FIGURES.items():
@@ -32,6 +38,18 @@ def on_files(files: Files, config: Any) -> Files:
             plots.save(make(), buffer, name.rpartition(".")[2])
         files.append(File.generated(config, f"images/{name}", content=buffer.getvalue()))
     return files
+
+
+@cache
+def computed(name: str) -> Any:
+    """Dataset of a shipped case, which several figures show."""
+    return surfacechem.run(name).dataset
+
+
+@cache
+def swept(name: str) -> Any:
+    """Dataset of its sweep."""
+    return surfacechem.sweep(name).dataset
 
 
 def new(width: float, height: float) -> Figure:
@@ -105,7 +123,7 @@ def adhesive() -> Figure:
 
 def press() -> Figure:
     """Flux through contact spots while a plate is pressed on another."""
-    run = surfacechem.run("press-conductance").dataset
+    run = computed("press-conductance")
     figure = new(7.2, 2.8)
     left, right = figure.subplots(1, 2, sharex=True)
     left.plot(run.time, run.q_1_spots / 1e3, color=BLUE)
@@ -121,7 +139,7 @@ def press() -> Figure:
 
 def sudden_contact() -> Figure:
     """Temperatures across two slabs that touch, and that of their contact."""
-    run = surfacechem.run("sudden-contact").dataset
+    run = computed("sudden-contact")
     figure = new(7.2, 2.8)
     left, right = figure.subplots(1, 2)
     for time, shade in ((0.05, "0.7"), (0.5, "0.55"), (2.0, "0.4"), (8.0, "0.2"), (60.0, "0.0")):
@@ -140,7 +158,7 @@ def sudden_contact() -> Figure:
 
 def closing_gap() -> Figure:
     """Conductance of gas and radiation against the gap."""
-    run = surfacechem.run("closing-gas-gap").dataset
+    run = computed("closing-gas-gap")
     figure = new(4.6, 2.8)
     ax = figure.subplots()
     difference = run.T_2 - run.T_1
@@ -154,7 +172,7 @@ def closing_gap() -> Figure:
 
 def oil_film() -> Figure:
     """Temperatures and viscosity of an oil film that heats."""
-    run = surfacechem.run("lubricated-sliding").dataset
+    run = computed("lubricated-sliding")
     figure = new(7.2, 2.8)
     left, right = figure.subplots(1, 2, sharex=True)
     _temperatures(left, run, "T_1", "T_2", "T_c")
@@ -173,7 +191,7 @@ def _temperatures(ax: Any, run: Any, *names: str) -> None:
 
 def force_spectrum() -> Figure:
     """Rupture forces over six decades of loading rate, and the exact ones."""
-    return plots.figure(surfacechem.sweep("force-spectroscopy").dataset)
+    return plots.figure(swept("force-spectroscopy"))
 
 
 def precision() -> Figure:
@@ -323,19 +341,19 @@ SWEPT = (
 def gallery(name: str) -> Figure:
     """A case of the gallery."""
     if name in SWEPT:
-        return plots.figure(surfacechem.sweep(name).dataset)
+        return plots.figure(swept(name))
     variables, against = GALLERY.get(name, (None, None))
-    return plots.figure(surfacechem.run(name).dataset, variables, against)
+    return plots.figure(computed(name), variables, against)
 
 
 def surfaces(name: str) -> Figure:
     """Profiles, tractions and force of a case with curved surfaces."""
-    return plots.figure(surfacechem.run(name).dataset, ["traction"])
+    return plots.figure(computed(name), ["traction"])
 
 
 def gas_network() -> Figure:
     """The figure of the notebook."""
-    return runpy.run_path(str(Path(__file__).parent / "notebooks" / "gas_network.py"))["figure"]
+    return execution.executed(str(Path(__file__).parent / "notebooks" / "gas_network.py"))[1]["figure"]
 
 
 def rooms() -> Figure:
