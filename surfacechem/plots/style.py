@@ -17,6 +17,7 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 from matplotlib.axis import XAxis, YAxis
+from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
@@ -120,13 +121,11 @@ def narrow() -> Iterator[None]:
 def save(plot: Figure, target: Any, kind: str) -> None:
     """Write a figure as png, svg or pdf; equal figures give equal bytes."""
     metadata: Mapping[str, None] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
+    usual, canvas = plot.dpi, plot.canvas
     with matplotlib.rc_context(STYLE):
-        if kind != "png":
-            plot.savefig(target, format=kind, dpi=DOTS, metadata=metadata)
-            return
-        usual, canvas = plot.dpi, plot.canvas
         plot.dpi = DOTS
-        FigureCanvasAgg(plot).print_png(target)  # type: ignore[no-untyped-call]  # `savefig` draws twice
+        printer: Any = get_registered_canvas_class(kind)(plot)
+        getattr(printer, f"print_{kind}")(target, metadata=metadata)  # `savefig` draws twice
         plot.dpi, plot.canvas = usual, canvas
 
 

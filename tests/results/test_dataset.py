@@ -76,13 +76,6 @@ def test_every_kind_of_variable_is_in_a_file_that_is_checked():
     assert set().union(*map(kinds, names())) == set().union(*map(kinds, OF_EVERY_KIND))
 
 
-def test_texts_have_no_unit():
-    events = solved("stick-slip").dataset
-    assert [name for name, x in events.variables.items() if x.dtype.kind == "O" and "units" in x.attrs] == []
-    assert "units" not in solved("dna-adhesive").dataset["species"].attrs
-    assert events["event_time"].attrs["units"] == "s"
-
-
 def test_every_unit_follows_the_cf_conventions(suite, tmp_path):
     units = sorted({column.unit for name in names() for column in solved(name).columns if column.unit})
     times = [column for column in solved("exothermic").columns if column.name == "time"]
@@ -103,18 +96,6 @@ def test_a_file_that_breaks_the_conventions_is_noticed(suite, tmp_path, attribut
     broken["T"].attrs[attribute] = value
     broken.to_netcdf(tmp_path / "broken.nc")
     assert any(complaint in message for message in complaints(suite, tmp_path / "broken.nc"))
-
-
-def test_says_what_was_run_and_how_it_went(solution):
-    attributes = solution.dataset.attrs
-    assert attributes["status"] == "finished"
-    assert attributes["reason"] == "reached the end at t = 2.5 s"
-    assert attributes["error"] < 1e-9
-    assert attributes["error_source"] == "exact solution exothermic-bonding"
-    assert attributes["energy_error"] < 1e-9
-    assert attributes["run_seconds"] > 0
-    assert attributes["count_steps"] > 0
-    assert "bond-energy" in attributes["case"]
 
 
 def test_carries_the_exact_solution_and_the_residuals(solution):
