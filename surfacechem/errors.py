@@ -23,6 +23,9 @@ LAWS, PATHS = "`surfacechem laws`", "`surfacechem equations CASE`"
 LONGEST = 2000
 """Largest length of a message [characters]; nobody reads more."""
 
+LONG_PART = re.compile(rf"(?<!\w)'[^']{{{LINES},}}'(?!\w)|\S{{{LONGEST // 2},}}")
+"""A quoted value of more than two lines, or a word that is too long for the path of a file."""
+
 LIKE = 0.6
 """Similarity of two names above which one is suggested for the other: a choice, that of `difflib`."""
 
@@ -56,7 +59,7 @@ class PlacedError(SurfacechemError):
     def __init__(self, message: str, place: Place | None = None, *, path: str = "") -> None:
         self.message = message = shortened(printable(message))
         self.place = place = place or (Place(path=path) if path else None)
-        super().__init__(printable(f"{place}: {message}" if place and str(place) else message))
+        super().__init__(shortened(printable(f"{place}: {message}" if place and str(place) else message)))
 
     def at(self, place: Place) -> Self:
         """Return the same error with its place, unless it already has one."""
@@ -103,7 +106,12 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """Return a text, without its middle if it is too long to be read."""
+    """Return a text without the middle of what is too long to be read: of quoted values and words, and of the rest.
+
+    >>> shortened(f"unknown key '{'long' * 1250}'. Known: run.")
+    "unknown key 'longlonglonglonglonglonglonglonglonglon [...] onglonglonglonglong'. Known: run."
+    """
+    text = LONG_PART.sub(lambda part: f"{part[0][:40]} [...] {part[0][-20:]}", text)
     half = LONGEST // 2
     return text if len(text) <= LONGEST else f"{text[:half]} [...] {text[-half:]}"
 
@@ -146,6 +154,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
     >>> nearest("cluster", ["bouncing-plate", "adhesion-cluster-held"]), nearest("debonding.yml", ["ends.yaml"])
     (" Did you mean 'adhesion-cluster-held'?", '')
+    >>> nearest("mu", ["interface.friction.coulomb.mu", "interface.friction.coulomb.mu_s", "initial.u"])
+    " Did you mean 'interface.friction.coulomb.mu'?"
     """
     guess = max(sorted(map(str, known)), key=lambda other: likeness(name, other), default="")
     return f" Did you mean '{guess}'?" if guess and likeness(name, guess)[0] >= LIKE else ""
@@ -154,10 +164,12 @@ def nearest(name: str, known: Iterable[str]) -> str:
 def likeness(name: str, other: str) -> tuple[float, float]:
     """Return the similarity of two names, without file suffixes, then with them.
 
-    A name whose words are all contained in the other counts as more similar than by its spelling.
+    A name whose words are all contained in the other counts as more similar than by its spelling, and all the more if
+    the other is a path that ends with it.
     """
     one, two = (FILE_SUFFIX.sub("", text.lower()) for text in (name[:LONGEST], other))
     words = [word for word in re.split(r"[^a-z0-9]+", one) if word]
     inside = bool(words) and all(re.search(rf"(?<![a-z0-9]){word}", two) for word in words)
     same = difflib.SequenceMatcher(None, two, one).ratio()
-    return (1 + same) / 2 if inside else same, difflib.SequenceMatcher(None, other, name[:LONGEST]).ratio()
+    ends = two.removesuffix(".level").endswith(f".{one}")
+    return (1 + same) / 2 + ends if inside else same, difflib.SequenceMatcher(None, other, name[:LONGEST]).ratio()

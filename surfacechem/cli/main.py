@@ -188,10 +188,8 @@ def check(
     settings = run_settings(simulation, solver, rtol, accuracy)
     model = simulation.model
     values = model.values()
-    try:
+    with simulation.case.locating():
         problem = model.problem(settings, values)
-    except InputError as error:
-        raise simulation.case.located(error) from None
     if model.program.rates is None:  # its search finds the start
         load_stepper()
     start, end = consistent_start(model, values), settings.times[-1]
@@ -205,8 +203,7 @@ def check(
         from surfacechem.runs.sweeps import parameter_names
 
         plan = simulation.plan()
-        swept = swept_in_words(plan, parameter_names(system, plan), simulation.units)
-        swept += f", each until {' = '.join(map(str, plan.until))}" if plan.until else ""
+        swept = swept_in_words(plan, parameter_names(system, plan))
         sweep = [("sweep", swept if simulation.case.sweep.keep is None else f"{swept}; {steps_of(simulation)}")]
     show(check_summary(simulation.case.title, system, scene, settings, numbers, found, why, sweep))
 

@@ -144,7 +144,7 @@ def si_factors(text: str) -> list[tuple[str, int]]:
 
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_QUANTITY = re.compile(rf"({_NUMBER})\s*(.*)", re.DOTALL)
+QUANTITY = re.compile(rf"({_NUMBER})\s*(.*)", re.DOTALL)
 _NOT_FINITE = re.compile(r"[-+]?\.?(?:inf|nan)", re.IGNORECASE)
 
 _EXPONENT = re.compile(r"(?:\^|\*\*)\s*\(?\s*[-+]?\s*\d{1,2}(?![\d.])")
@@ -243,7 +243,7 @@ def _number(value: object, unit: str, name: str, difference: bool) -> float:
     text = value.strip()
     if _NOT_FINITE.fullmatch(text):
         raise InputError(f"{name} must be finite, got {text}.")
-    found = _QUANTITY.fullmatch(text) if len(text) <= _MOST_CHARACTERS else None
+    found = QUANTITY.fullmatch(text) if len(text) <= _MOST_CHARACTERS else None
     if found is None:
         raise InputError(f"{_short(text)} is not a number with a unit; {name} needs {dimension(unit)}.")
     return _converted(found[1], found[2], unit, name, difference) if found[2] else float(found[1])

@@ -127,12 +127,12 @@ class Tree:
             raise self.error(f"no {what} {self.shown}.{suggestion(str(self.value), options)}")
         return self.value
 
-    def places(self) -> Iterator[tuple[str, Place]]:
-        """Yield the path and place of this value and of every value below it."""
-        yield self.place.path, self.place
+    def walk(self) -> Iterator[Tree]:
+        """Yield every tree below this one, and itself last."""
         children = self.value.values() if isinstance(self.value, dict) else self.value
         for child in children if isinstance(self.value, dict | list) else ():
-            yield from child.places()
+            yield from child.walk()
+        yield self
 
 
 def read(path: Path, name: str = "", limits: Limits = LIMITS) -> str:

@@ -14,8 +14,8 @@ import hashlib
 import linecache
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BufferedIOBase, TextIOBase
@@ -146,15 +146,19 @@ class Case:
 
     def refuse_nothing(self) -> None:
         """Raise InputError if the scene has no state, without computing integrals over surfaces."""
-        try:
+        with self.locating():
             refuse_static(self._surrogate_system, self.file or "CASE")
-        except InputError as error:
-            raise self.located(error) from None
 
     def system(self) -> System:
         """Assemble the scene; errors get their place in the case file."""
-        try:
+        with self.locating():
             return assemble(self.scene)
+
+    @contextmanager
+    def locating(self) -> Iterator[None]:
+        """Add file and line to input errors raised in a block."""
+        try:
+            yield
         except InputError as error:
             raise self.located(error) from None
 
@@ -238,7 +242,7 @@ def load_text(
         sweep=case.sweep,
         text=text,
         mechanism_text=mechanism.text if mechanism else None,
-        places=dict(tree.places()),
+        places={each.place.path: each.place for each in tree.walk()},  # a table in a file has no path, like the whole
         file=tree.place.file,
         unused=unused,
     )
@@ -276,4 +280,4 @@ def _find(name: str) -> tuple[Path, str]:
             raise InputError(f"is a link to {path.readlink()}, where no file is.", Place(name))
         beside = [file.name for file in path.parent.iterdir() if file.suffix in (".yaml", ".yml")]
     guess = nearest(path.name, [*names(), *beside])
-    raise InputError(f"no file and no case '{name[:200]}'.{guess} `surfacechem cases` lists those of the package.")
+    raise InputError(f"no file and no case '{name}'.{guess} `surfacechem cases` lists those of the package.")

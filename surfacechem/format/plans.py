@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.contracts.units import QUANTITY, parse
 from surfacechem.documents.document import OVERRIDE, Tree, parameter_path
 from surfacechem.errors import PATHS, InputError, Place, refuse_unknown
 from surfacechem.format import data_files
@@ -378,6 +379,8 @@ class Plan:
     sample: Sample | None = None
     places: Mapping[str, Place] = field(default_factory=dict, compare=False)
     """Places of the swept parameters and of the end of the runs in the input, by path."""
+    units: Mapping[str, tuple[str, float, float]] = field(default_factory=dict, compare=False)
+    """Units in which the input gives the swept parameters, by path: name, zero and one, these in SI."""
 
     def __post_init__(self) -> None:
         """Check that parameters are distinct and not too many, and that zipped ones have equally many values."""
@@ -428,6 +431,15 @@ class Plan:
         """Swept values of each run by path; the last dimension varies fastest."""
         values = self.at(np.arange(self.size))
         return [dict(zip(values, row, strict=True)) for row in zip(*(x.tolist() for x in values.values()), strict=True)]
+
+    def told(self, path: str, *values: float) -> str:
+        """Return a value of a parameter, or the ends of its range, in the unit of the input.
+
+        >>> Plan([Axis("T", [298.15])], units={"T": ("degC", 273.15, 274.15)}).told("T", 298.15, 300.15)
+        '25 to 27 degC'
+        """
+        unit, zero, one = self.units.get(path, ("1", 0.0, 1.0))
+        return f"{' to '.join(f'{(value - zero) / (one - zero):g}' for value in values)} {unit}".removesuffix(" 1")
 
     def located(self, error: InputError) -> InputError:
         """Return an error about a swept parameter with its place in the input, if known."""
@@ -507,9 +519,18 @@ def plan_of(
         draws = {path: _distribution(path, tree, units[path]) for path, tree in known.items()}
         sample = Sample(draws, drawn.runs, drawn.method, drawn.seed)
     ends = until or section.until
+    paths = dict(trees)
     trees["sweep.until"] = Tree(None, Place(OVERRIDE)) if until else section.tree.value.get("until", section.tree)
     places = {path: replace(tree.place, path="") for path, tree in trees.items()}  # messages contain the path anyway
-    return Plan(axes, next(iter(ends.items())) if ends else None, section.combine != GRID, sample, places)
+    told = {path: _scale(tree, units[path]) for path, tree in paths.items()}
+    return Plan(axes, next(iter(ends.items())) if ends else None, section.combine != GRID, sample, places, told)
+
+
+def _scale(tree: Tree, unit: str) -> tuple[str, float, float]:
+    """Return the unit of the first quantity of a tree, else that in SI, with its zero and its one in SI."""
+    found = (QUANTITY.fullmatch(str(each.value)) for each in tree.walk())
+    name = next((quantity[2] for quantity in found if quantity and quantity[2]), unit)
+    return name, parse(f"0 {name}", unit), parse(f"1 {name}", unit)
 
 
 def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:

@@ -118,14 +118,8 @@ def _short(paths: Sequence[str]) -> dict[str, str]:
 def _settings(dataset: xarray.Dataset) -> dict[str, str]:
     """Return the values of the case of a dataset by path, as written, with the changes of the run."""
     text, attributes = str(dataset.attrs.get("case", "")), dataset.attrs
-    found: dict[str, str] = {}
-    leaves = [document.parse(text)] if text else []
-    while leaves:
-        tree = leaves.pop(0)
-        if isinstance(tree.value, dict | list):
-            leaves = [*(tree.value.values() if isinstance(tree.value, dict) else tree.value), *leaves]
-        else:
-            found[tree.place.path] = str(tree.value)
+    every = document.parse(text).walk() if text else ()
+    found = {each.place.path: str(each.value) for each in every if not isinstance(each.value, dict | list)}
     # A run from Python may differ from its case; the dataset records the changes separately.
     for path, (value, si) in changes_of(attributes).items():
         text, size = style.prefixed(si, np.array([value]))
@@ -154,17 +148,9 @@ def _merge_panels(found: Sequence[Sequence[Panel]]) -> list[Panel]:
 def _labels_with_coincidences(datasets: Sequence[xarray.Dataset], shown: Sequence[str]) -> list[str]:
     """Return the labels of datasets, with a note on those whose curves are hidden below others."""
     names = labels(datasets)
-    twins = [next(k for k, other in enumerate(datasets) if _coincide(other, each, shown)) for each in datasets]
+    held = [[each[name].values.tobytes() if name in each else b"" for name in shown] for each in datasets]
+    twins = [held.index(values) for values in held]
     return [names[k] + (f", the same as {names[j]}" if j < k else "") for k, j in enumerate(twins)]
-
-
-def _coincide(one: xarray.Dataset, other: xarray.Dataset, names: Sequence[str]) -> bool:
-    """True if two datasets hold the same values of these variables."""
-    both = [name for name in names if name in one or name in other]
-    return all(
-        name in one and name in other and np.array_equal(one[name].values, other[name].values, equal_nan=True)
-        for name in both
-    )
 
 
 def _draw(
@@ -182,7 +168,8 @@ def _draw(
                 kw["drawstyle"] = style.drawn_as(dataset[name])
                 style.draw_curve(ax, dataset, over, values, color=colour, linestyle=dash, linewidth=1.3, **kw)
     words = panel.title or ", ".join(map(symbol, panel.names[:2]))
-    style.label(ax.yaxis, words, panel.unit, np.concatenate(drawn))
+    error = max(style.error_of(each, panel.names) or 0.0 for each in datasets)
+    style.label(ax.yaxis, words, panel.unit, np.concatenate(drawn), error=error)
     several = panel.names if len(panel.names) > 1 else ()
     for name, dash in zip(several, cycle(LINE_STYLES), strict=False):
         ax.plot([], [], color="black", linestyle=dash, linewidth=1.3, label=symbol(name))

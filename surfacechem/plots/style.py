@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from io import BytesIO
@@ -55,6 +55,9 @@ STYLE: Any = {
 
 # A curve that changes by less than this part of its size, 9e-10, is constant: the change may be rounding.
 FLAT = 1000 * RUN_EPS
+
+# An axis of a constant spans this part of it on each side.
+CONSTANT_PART = 0.05
 
 # Units that take a prefix, and the range of the largest value in which they need none.
 TAKES_PREFIX = ("J", "N", "Pa", "W", "m", "s")
@@ -202,7 +205,11 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     title = wrap(str(attributes.get("title", "")), int(TITLE_PER_INCH * plot.get_figwidth())) or [""]
     plot.suptitle("\n".join(title), **TITLE_STYLE)
     facts = [str(attributes.get("reason", "")) or _ends(dataset)]
-    facts += _error_of(dataset)
+    if (error := error_of(dataset)) is not None:
+        exact = str(attributes.get("error_source", "")).startswith("exact")
+        exact = exact or any(str(name).endswith("_exact") for name in dataset)
+        kind = "of the checked runs" if "checked_error" in dataset else "(exact solution)" if exact else "(estimate)"
+        facts.append("error unknown" if np.isnan(error) else f"error {error:.1e} {kind}")
     if "solver" in attributes and (rtol := attribute(dataset, "rtol")) is not None:
         facts.append(f"{attributes['solver']}, rtol {rtol:g}")
     if "time" in dataset.sizes and dataset.sizes.get("event", 0) > dataset.sizes["time"]:
@@ -217,18 +224,26 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     ax.set_title("\n".join(lines), loc="left", pad=6 + above, **NOTE_STYLE)
 
 
-def _error_of(dataset: xarray.Dataset) -> list[str]:
-    """Return the error of a run, of a sweep, or of the checked runs of a store, if one of these is told."""
-    error, kind = attribute(dataset, "error"), "of the checked runs"
-    if error is not None:
-        exact = str(dataset.attrs.get("error_source", "")).startswith("exact")
-        exact = exact or any(str(name).endswith("_exact") for name in dataset)
-        kind = "(exact solution)" if exact else "(estimate)"
-    elif "checked_error" in dataset:
-        error = float(np.fmax.reduce([*dataset["checked_error"].values, *dataset["hardest_error"].values]))
-    else:
-        return []
-    return ["error unknown" if np.isnan(error) else f"error {error:.1e} {kind}"]
+def error_of(dataset: xarray.Dataset, names: Sequence[str] = ()) -> float | None:
+    """Return the largest relative error of variables that have one of their own, else that of the dataset, of a store
+    that of its checked runs; None if none is told.
+    """
+    own = [float(dataset[n].attrs["error"]) for n in names if n in dataset and "error" in dataset[n].attrs]
+    if not own and "checked_error" in dataset:
+        own = [*dataset["checked_error"].values, *dataset["hardest_error"].values]
+    return float(np.fmax.reduce(own)) if own else attribute(dataset, "error")
+
+
+def limit_zoom(set_ends: Callable[[float, float], Any], values: Array, error: float | None) -> None:
+    """Set the ends of an axis such that it does not magnify rounding, or what is within the relative error."""
+    finite, half = values[np.isfinite(values)], (error or 0.0) * largest(values)
+    if not len(finite):
+        return
+    middle = float(finite.min() + finite.max()) / 2
+    if not varies(finite):
+        half = CONSTANT_PART * abs(middle or 1.0)
+    if np.ptp(finite) < 2 * half:
+        set_ends(middle - half, middle + half)
 
 
 WITHOUT_END, STOPPED = ("failed", "refused"), "stopped"
@@ -441,11 +456,14 @@ def parameter_words(values: xarray.DataArray) -> str:
     'Loading rate of $f$'
     >>> parameter_words(xarray.DataArray(1e-9, name="loading_f", attrs={"long_name": "value (loading.f.level)"}))
     'Force per bond $f$'
+    >>> parameter_words(xarray.DataArray(1e-3, name="rate", attrs={"long_name": "rate (loading.w_t.ramp.rate)"}))
+    'Rate of change of $w_{t}$'
     """
     load = re.search(r"\(loading\.(\w+)\.[\w.-]*rate\)$", str(values.attrs.get("long_name", "")))
-    if load and unit(values).startswith(("N", "Pa")):
-        return f"Loading rate of {symbol(load[1])}"
-    words = meaning(values).partition(" (")[0]
+    if load:
+        kind = "Loading rate" if unit(values).startswith(("N", "Pa")) else "Rate of change"
+        return f"{kind} of {symbol(load[1])}"
+    words = re.split(r" \(|; ", meaning(values))[0]
     held = re.search(r"\(loading\.(\w+)(\.level)?\)$", str(values.attrs.get("long_name", "")))
     if held and held[1] in VARIABLES:
         text = VARIABLES[held[1]].long_name.partition(",")[0]
@@ -541,8 +559,14 @@ def make_logarithmic(*axes: XAxis | YAxis, size: float = 1.0) -> None:
         axis.set_minor_locator(_FewDecades(subs="auto"))
 
 
-def label(axis: XAxis | YAxis, words: str, unit: str, values: Array, between: str = " ") -> None:
-    """Label a linear axis with words and unit, and its ticks in the prefix that suits these values."""
+def label(
+    axis: XAxis | YAxis, words: str, unit: str, values: Array, between: str = " ", error: float | None = None
+) -> None:
+    """Label a linear axis with words and unit, and its ticks in the prefix that suits these values; one of y does not
+    magnify what is within their relative ``error``.
+    """
+    if isinstance(axis, YAxis):
+        limit_zoom(axis.axes.set_ylim, values, error)
     text, size = prefixed(unit, values)
     power = math.floor(math.log10(largest(values) or 1.0))
     if size == 1.0 and not POWERS[0] <= power < POWERS[1]:
@@ -552,7 +576,7 @@ def label(axis: XAxis | YAxis, words: str, unit: str, values: Array, between: st
     if size == 1.0:
         axis.axes.ticklabel_format(axis="x" if isinstance(axis, XAxis) else "y", useOffset=False, scilimits=POWERS)
     else:
-        axis.set_major_formatter(lambda value, _: Formatter.fix_minus(f"{value / size:.10g}"))
+        axis.set_major_formatter(lambda value, _: Formatter.fix_minus(f"{value / size:.12g}"))
 
 
 def label_variable(axis: XAxis | YAxis, values: xarray.DataArray) -> None:

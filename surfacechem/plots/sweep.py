@@ -83,18 +83,13 @@ def varying_numbers(dataset: xarray.Dataset, axes: Sequence[str], known: Sequenc
     ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
     # Fractions, of bonds say, are compared with one: those left of broken bonds are rounding.
     sizes = {name: float(unit(dataset[name]) == "1") for name in ends}
-    shown = _distinct(dataset, [name for name in ends if varies(subsample(dataset, name), sizes[name])])
+    first: dict[bytes, str] = {}  # of several with the same values, such as a maximum that is the final value
+    for name in ends:
+        if varies(values := subsample(dataset, name), sizes[name]):
+            first.setdefault(values.tobytes(), name)
+    shown = [*first.values()]
     groups = ([name for name in shown if any(re.fullmatch(rank, name) for rank in ranks)] for ranks in TELLING)
     return next(filter(None, groups), ["time_reached"])[:MOST_PANELS]
-
-
-def _distinct(dataset: xarray.Dataset, names: Sequence[str]) -> list[str]:
-    """Return the names without those of equal values, such as a maximum that is the final value."""
-    shown: list[str] = []
-    for name in names:
-        values = subsample(dataset, name)
-        shown += [] if any(np.array_equal(values, subsample(dataset, n), equal_nan=True) for n in shown) else [name]
-    return shown
 
 
 def with_final_bonds(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
@@ -142,6 +137,7 @@ def heat_maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: S
         for ax, name in zip(grid[:, 0], names, strict=True):
             values = np.ma.masked_invalid(final_values(dataset, name))
             image = ax.pcolormesh(x.values, y.values, values.T, shading="nearest", cmap="viridis", rasterized=True)
+            style.limit_zoom(image.set_clim, values.compressed(), style.error_of(dataset, [name]))
             bar = plot.colorbar(image, ax=ax)
             style.label(bar.ax.yaxis, style.quantity_words(dataset[name]), unit(dataset[name]), values.compressed())
             style.draw_parameter(ax.yaxis, y, plan.axes[1].logarithmic)
@@ -161,10 +157,10 @@ def trajectories(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequen
         message = f"{single} does not go along the runs. Leave `against` out: the figure is over what is swept."
         raise InputError(message, style.place_of(dataset))
     refuse_unknown(asked, known, "no variable '{}' along the runs of the sweep", style.place_of(dataset))
-    usual = [name for _, *kind in PANELS[:2] for name in of_kind(dataset, series, *kind)]
+    usual = [name for _, *kind in PANELS for name in of_kind(dataset, series, *kind)]
     moving = [name for name in usual if name != against and varies(subsample(dataset, name))]
     if not (names := list(dict.fromkeys(variables or moving[:MOST_PANELS]))):
-        raise InputError(f"neither bonds nor temperatures change: name variables to show over {against}.")
+        raise InputError(f"none of the usual variables changes: name some to show over {against}.")
     return curves(dataset, axes, names, against)
 
 
@@ -185,7 +181,8 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
             values = dataset[name].values.reshape(count, -1)[members]
             for line, run, k in zip(values, x, members, strict=True):
                 ax.plot(run, line, drawstyle=style.drawn_as(dataset[name]), **line_style(dataset, axes, k))
-            style.label(ax.yaxis, style.quantity_words(dataset[name]), unit(dataset[name]), values)
+            error = style.error_of(dataset, [name])
+            style.label(ax.yaxis, style.quantity_words(dataset[name]), unit(dataset[name]), values, error=error)
             style.legend(ax)
         style.label(grid[-1, 0].xaxis, "Time" if against in (None, "time") else symbol(against), unit(over), x)
         many = RUN_DIMENSION not in axes and count > style.MOST_CURVES
@@ -245,7 +242,8 @@ def effects(
             whole = dataset[name]
             values = subsample(dataset, name)
             distribution(row[0], values)
-            style.label(row[0].yaxis, style.quantity_words(whole), unit(whole), values)
+            error = style.error_of(dataset, [name])
+            style.label(row[0].yaxis, style.quantity_words(whole), unit(whole), values, error=error)
             for ax, parameter in zip(row[1:], parameters, strict=True):
                 over = dataset[parameter].broadcast_like(whole).transpose(*axes).values.ravel()
                 effect(ax, over[:: -(-over.size // MOST_POINTS)], values)
@@ -330,7 +328,9 @@ def figure_of_rupture(dataset: xarray.Dataset, load: str, variables: Sequence[st
             ax.sharex(grid[1, 0])
             if legend := ax.get_legend():
                 legend.remove()  # the colours are those of the distributions
-        style.headings(plot, grid[0, 0], dataset)
+        note = grid[0, 0].get_title("right")  # beside the headings there is no room for it
+        grid[0, 0].set_title("", loc="right")
+        style.headings(plot, grid[0, 0], dataset, more=note)
     return plot
 
 
@@ -397,7 +397,7 @@ def _draw_statistics(ax: Axes, dataset: xarray.Dataset, words: Mapping[str, str]
             style.curves_by_second(dataset, final_values(dataset, name)), COLOURS, strict=False
         ):
             ax.plot(x, values / size, marker, color=colour if len(seconds) > 1 else own, markersize=large, label="_")
-    for label, colour in zip(seconds if len(seconds) > 1 else (), COLOURS, strict=False):
+    for label, colour in zip(filter(None, seconds), COLOURS, strict=False):
         ax.plot([], [], color=colour, label=label)
     for word, marker, colour in zip(words.values(), MARKERS, COLOURS, strict=False):
         ax.plot([], [], marker, color="black" if len(seconds) > 1 else colour, markersize=large, label=word)
@@ -473,8 +473,6 @@ def _final_values(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) ->
         for ax, panel in zip(grid[:, 0], shown, strict=True):
             _draw_final(ax, dataset, panel.names)
         style.mark_without_end(grid[:, 0].tolist(), dataset)
-        for ax in grid[:, 0]:
-            style.legend(ax)
         style.draw_parameter(grid[-1, 0].xaxis, dataset[axis])
         style.headings(plot, grid[0, 0], dataset)
     return plot
@@ -543,4 +541,6 @@ def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None
             ax.plot(x, values, marker=marker, markersize=style.MARKER_SIZE, label=words, **kw)
     which = ("Final " if ends_are_known(dataset, names) else "Last output ") if at_end else ""
     said = f"{which}{style.quantity_words(dataset[names[0]]) if len(names) == 1 else 'value'}"
-    style.label(ax.yaxis, said, unit(dataset[names[0]]), np.stack(list(ends.values())))
+    values, error = np.stack(list(ends.values())), style.error_of(dataset, names)
+    style.label(ax.yaxis, said, unit(dataset[names[0]]), values, error=error)
+    style.legend(ax)

@@ -282,10 +282,8 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
         start = _show_behind_spike(ax, dataset, panel)
     drawn = _finite_values(dataset, panel, t >= start if start else slice(None))
     words = panel.title or ", ".join(map(symbol, panel.names[:MOST_NAMES]))
-    style.label(ax.yaxis, words, panel.unit, drawn, between=" " if len(panel.title) < ONE_LINE_LETTERS else "\n")
-    if len(drawn) and not varies(drawn):  # a constant, whose rounding must not fill the panel
-        middle = float(drawn.mean())
-        ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
+    between, error = " " if len(panel.title) < ONE_LINE_LETTERS else "\n", style.error_of(dataset, panel.names)
+    style.label(ax.yaxis, words, panel.unit, drawn, between, error)
     style.legend(ax)
 
 

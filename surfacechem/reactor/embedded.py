@@ -207,7 +207,7 @@ class EmbeddedScene:
         self.loads = {f"loading.{name}.level": function for name, function in loads.items()}
         self._asks = False
         """Whether loads are asked for their values."""
-        try:
+        with case.locating():
             scene = coupling.with_heat(coupling.with_reactors(case.scene, reactors), heated)
             scene = coupling.with_loads(scene, {name: function(0.0) for name, function in loads.items()})
             scene = coupling.with_neighbours(scene, neighbours or {})
@@ -222,8 +222,6 @@ class EmbeddedScene:
             self.model = Model(system)
             self.values = self.model.values()
             self.problem = self.model.problem(Run(times=(0.0, NO_END)), self.values, passing=False)
-        except InputError as error:
-            raise case.located(error) from None
         self.evaluation = Evaluation(self.problem.program, self.problem.y0, self.problem.parameters[0])
         self.events: InstantEvents | None = None
         self.begin_segment(0.0, DIFFERENCE_STEPS)

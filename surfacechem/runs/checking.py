@@ -56,7 +56,7 @@ class Checked:
     def __str__(self) -> str:
         """The errors in words."""
         known = f"{self.error:.2g} of {self.count} runs ({self.source})" if self.unknown < self.count else ""
-        unknown = unknown_in(self.unknown, self.why) if self.unknown else ""
+        unknown = unknown_in(self.unknown, self.why)
         return "; ".join(filter(None, (known, unknown)))
 
 

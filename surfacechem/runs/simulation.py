@@ -187,20 +187,16 @@ class Simulation:
         """The compiled system."""
         if self.system.is_static:
             self.case.refuse_nothing()
-        try:
+        with self.case.locating():
             return Model(self.system)
-        except InputError as error:
-            raise self.case.located(error) from None
 
     @cached_property
     def evaluator(self) -> Evaluator:
         """The scene compiled for evaluation at given states."""
         from surfacechem.runs.points import Evaluator
 
-        try:
+        with self.case.locating():
             return Evaluator(self.case.scene)
-        except InputError as error:
-            raise self.case.located(error) from None
 
     @concise
     def evaluate(self, points: Points | None = None) -> xarray.Dataset:
@@ -582,8 +578,7 @@ class Simulation:
         section = self.case.sweep
         lists, arrays = split_arrays(over or {})
         given = {"over": None if over is None else lists, "combine": combine, "sample": sample}
-        if any(value is not None for value in given.values()):
-            said = {name: value for name, value in given.items() if value is not None}
+        if said := {name: value for name, value in given.items() if value is not None}:
             section = read_sweep(from_plain(said, Place(OVERRIDE, path="sweep")), section)
         if section is None:
             message = "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over."

@@ -162,10 +162,13 @@ def statistics(trajectory: Trajectory, variable: str) -> Statistics:
     words = [*(margin.reason for margin in model.margins), *(item.reason for item in model.system.edges)]
     reasons = np.array(words)[result.events.index]
     at = model.evaluate(result, result.events.t, result.events.y, result.events.ydot)
-    halves, peaks = at[reasons == MEDIAN_REASON], np.concatenate([trajectory.outputs[:1], at[reasons == MODE_REASON]])
-    survivors, integral = _at_end(trajectory, f"mean_{variable}")
+    end, integral = _at_end(trajectory, f"mean_{variable}")
+    survivors, halves = end[columns["survival"]], at[reasons == MEDIAN_REASON]
+    peaks = np.array([end, trajectory.outputs[0], *at[reasons == MODE_REASON]])
+    peak = np.argmax(peaks[:, density])
     return Statistics(
-        mode=float(peaks[np.argmax(peaks[:, density]), column]),
+        # Of a density that still grows at the end, with bonds left, the peak would come later.
+        mode=float(peaks[peak, column]) if peak or survivors < INTACT else math.nan,
         median=float(halves[0, column]) if len(halves) else math.nan,
         mean=float(trajectory.outputs[0, column] + integral) if survivors < INTACT else math.nan,
     )
@@ -173,13 +176,14 @@ def statistics(trajectory: Trajectory, variable: str) -> Statistics:
 
 def lifetime(trajectory: Trajectory) -> Lifetime:
     """Return the mean lifetime of a run of a system :func:`with_lifetime`; NaN if too many bonds are left."""
-    survivors, integral = _at_end(trajectory, "lifetime")
+    end, integral = _at_end(trajectory, "lifetime")
+    survivors = end[trajectory.model.system.output_columns["survival"]]
     return Lifetime(integral if survivors <= 1.01 * INTACT else math.nan)
 
 
-def _at_end(trajectory: Trajectory, account: str) -> tuple[float, float]:
-    """Return the survival at the end of a run, and an account of its ledger."""
+def _at_end(trajectory: Trajectory, account: str) -> tuple[Array, float]:
+    """Return the outputs at the end of a run, and an account of its ledger."""
     result, system = trajectory.result, trajectory.model.system
     end = trajectory.model.evaluate(result, np.array([result.t]), result.y[None], result.ydot[None])[0]
     accounts = [item.quantity.name for item in system.ledger]
-    return float(end[system.output_columns["survival"]]), float(result.ledger[accounts.index(account)])
+    return end, float(result.ledger[accounts.index(account)])

@@ -152,8 +152,9 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
     energy, entropy, sites = (f"{solution.worst(balance):.1e}" for balance in ("energy", "entropy", "site"))
     count = sum(audit.destroys for audit in solution.audits)
     verdict = f"ENTROPY DESTROYED in {counted(count, 'run')}" if count else "no law destroys entropy"
+    verdict += ", jumps do" if any(entropy_destroyed(run.jumps) for run in solution.runs) else ""
     every = [
-        ("swept", swept_in_words(solution.plan, solution.parameters, solution.system.changeable)),
+        ("swept", swept_in_words(solution.plan, solution.parameters)),
         ("solved", _solved(solution.system, solution.run)),
         ("ended", f"{counted(len(solution.runs), 'run')}: {solution.ends}"),
         ("error", error),
@@ -170,33 +171,33 @@ def sweep_details(solution: SweepSolution) -> dict[str, Rows]:
     """Return a table of the ends of the runs of a sweep, or of the first ones, with their parameters."""
     errors = [f"error {error:.2g}" for error in solution.accuracy.errors] if solution.accuracy else [""] * MOST_RUNS
     shown = range(min(len(solution.runs), MOST_RUNS))
-    points = solution.plan.at(np.arange(len(shown)))
-    rows = [
-        (
-            ", ".join(f"{name} = {points[path][k]:g}" for name, path in solution.parameters.items()),
-            solution.runs[k].status,
-            errors[k],
-            solution.runs[k].reason,
-        )
-        for k in shown
-    ]
+    runs = zip(_points_told(solution, shown), solution.runs, errors, strict=False)
+    rows = [(given, run.status, error, run.reason) for given, run, error in runs]
     more = len(solution.runs) - len(shown)
     return {"Runs": [*rows, *([("...", f"{more} more", "", "")] if more else [])]}
 
 
-def swept_in_words(plan: Plan, names: Mapping[str, str], units: Mapping[str, str]) -> str:
+def _points_told(solution: SweepSolution, numbers: Sequence[int]) -> list[str]:
+    """Return the parameters of the runs with these numbers in words."""
+    points = solution.plan.at(np.array(numbers))
+    told = ([f"{n} = {solution.plan.told(p, x)}" for x in points[p]] for n, p in solution.parameters.items())
+    return [*map(", ".join, zip(*told, strict=True))]
+
+
+def swept_in_words(plan: Plan, names: Mapping[str, str]) -> str:
     """Describe the parameters of a plan: number of values and range of each, and the draws of a sample."""
     axes = []
     for (name, path), axis in zip(names.items(), plan.axes, strict=False):
         first, last = axis.at(np.array([0, -1]) % len(axis))
-        span = f"{first:g} to {last:g}" if len(axis) > 1 else f"{first:g}"
-        axes.append(f"{name} ({f'{span} {units[path]}'.removesuffix(' 1')}, {counted(len(axis), 'value')})")
-    text = (" with " if plan.zipped else " by ").join(axes)
-    if plan.sample is None:
-        return text
-    drawn = ", ".join([*names][len(plan.axes) :])
-    sample = f"{plan.sample.runs} draws of {drawn} ({plan.sample.method}, seed {plan.sample.seed})"
-    return f"{text} by {sample}" if text else sample
+        span = plan.told(path, first, last) if len(axis) > 1 else plan.told(path, first)
+        axes.append(f"{name} ({span}, {counted(len(axis), 'value')})")
+    parts = [(" with " if plan.zipped else " by ").join(axes)] if axes else []
+    if plan.sample is not None:
+        drawn = ", ".join([*names][len(plan.axes) :])
+        parts.append(f"{plan.sample.runs} draws of {drawn} ({plan.sample.method}, seed {plan.sample.seed})")
+    name, value = plan.until or ("", 0.0)
+    unit = VARIABLES[name].unit if name in VARIABLES else ""
+    return " by ".join(parts) + (f", each until {name} = {value:g} {unit}".rstrip() if name else "")
 
 
 def points_summary(found: PointResults, written: Path | None) -> Sheet:
@@ -226,12 +227,12 @@ def _sweep_events(solution: SweepSolution) -> str:
         return ""
     found = []
     for verdict in sorted({jump.verdict for jump in jumps} - {ADMISSIBLE}):
-        count = sum(any(jump.verdict == verdict for jump in run) for run in runs)
-        found.append(f"{verdict} in {count} of {len(runs)} runs")
+        guilty = [{jump.edge.name for jump in run if jump.verdict == verdict} for run in runs]
+        names = ", ".join(sorted(set().union(*guilty)))
+        found.append(f"{names}: {verdict} in {sum(map(bool, guilty))} of {len(runs)} runs")
     destroyed = [entropy_destroyed(run) for run in runs]
     if (most := max(destroyed)) > 0:
-        values = solution.plan.at(np.array([destroyed.index(most)]))
-        at = ", ".join(f"{name} = {values[path][0]:g}" for name, path in solution.parameters.items())
+        (at,) = _points_told(solution, [destroyed.index(most)])
         found.append(f"at worst {-most:.3g} {solution.system.unit('J/(m^2 K)')} at {at}")
     return f"{event_counts(jumps)}; {', '.join(found) or 'all admissible'}"
 
@@ -373,7 +374,7 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
     destroys = checked.destroys if checked is not None else 0
     destroyed = f"; ENTROPY DESTROYED in {counted(destroys, 'run')}" if destroys else ""
     facts = [
-        ("swept", swept_in_words(chunks.plan, names, chunks.model.system.changeable)),
+        ("swept", swept_in_words(chunks.plan, names)),
         ("solved", _solved(chunks.model.system, chunks.run)),
         ("ended", f"{ends.sum()} of {counted(chunks.plan.size, 'run')}: {words}"),
         *([("error", error)] if error else []),

@@ -6,6 +6,7 @@ import json
 import logging
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, partial
 from typing import Any
@@ -19,6 +20,7 @@ from surfacechem.expressions import derivative
 from surfacechem.format import Case
 from surfacechem.format.plans import RUN_DIMENSION, STATISTICS, LazyArray, Plan, name_parts
 from surfacechem.model.system import System
+from surfacechem.quantities import VARIABLES
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import CELLS_UNKNOWN, ENDED_AT_START, CellErrors, second_tolerance
 from surfacechem.results.audit import Audit, audit
@@ -59,6 +61,9 @@ MOST_FOLLOWED = 64
 MOST_OUTPUTS = 128_000
 """Outputs of all runs of a sweep together, if they need more than the evenly spaced times."""
 
+UNBROKEN = "the run ended with too many bonds left"
+"""Reason why an error of the load at rupture, or of a lifetime, is unknown."""
+
 RUNS_AT_A_TIME = 64
 """Runs that are solved at a time; progress is reported between portions."""
 
@@ -89,7 +94,10 @@ def solve(
     model: Model, plan: Plan, run: Run, changes: Mapping[str, float], threads: int | None = None
 ) -> list[Trajectory]:
     """Solve the runs of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
-    values = _values(model, plan, changes)
+    values = []
+    for point in plan.points:
+        with _told(plan, point):
+            values.append(model.values({**changes, **point}))
     run = model.chosen(run, values[0])
     runs = settings(model.system, plan, following(model, plan, run, changes, threads), values)
     if run.steady:
@@ -98,10 +106,8 @@ def solve(
         refuse_histories(model.system)
         found = []
         for at, point in zip(values, plan.points, strict=True):
-            try:
+            with _told(plan, point):
                 found.append(to_steady_state(model, runs[0], at))
-            except InputError as error:
-                raise _of_run(point, error) from None
         runs = together(found)
     pairs = list(zip(runs, values, strict=True))
     done: list[Trajectory] = []
@@ -110,8 +116,11 @@ def solve(
         portion = pairs[start : start + RUNS_AT_A_TIME]
         try:
             done += model.solve_all(portion, threads or os.cpu_count() or 1)
-        except InputError as error:
-            raise _with_values(model, portion, plan.points[start:], error) from None
+        except InputError:
+            for pair, point in zip(portion, plan.points[start:], strict=False):
+                with _told(plan, point):
+                    model.problem(*pair)
+            raise
     return done
 
 
@@ -130,38 +139,16 @@ def following(model: Model, plan: Plan, run: Run, changes: Mapping[str, float], 
     return replace(run, times=shared_times(done, max(len(run.times), MOST_OUTPUTS // plan.size)))
 
 
-def _with_values(
-    model: Model,
-    runs: Sequence[tuple[Run, Mapping[str, float]]],
-    points: Sequence[Mapping[str, float]],
-    error: InputError,
-) -> InputError:
-    """Return the error with the swept values of the first refused run."""
-    for pair, point in zip(runs, points, strict=False):
-        try:
-            model.problem(*pair)
-        except InputError as found:
-            return _of_run(point, found)
-    return error
-
-
-def _of_run(point: Mapping[str, float], error: InputError, path: str = "") -> InputError:
-    """Return the error with the swept values of its run."""
-    given = ", ".join(f"{path} = {value:g}" for path, value in point.items())
-    more = f"This is the run with {given}; a store, -o NAME.zarr, marks such runs and goes on."
-    return InputError(f"{error.message} {more}", error.place, path=path)
-
-
-def _values(model: Model, plan: Plan, changes: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return the values of each run; InputError for the first that is out of its range."""
-    values = []
-    for point in plan.points:
-        try:
-            values.append(model.values({**changes, **point}))
-        except InputError as error:
-            path = next((path for path in point if error.message.startswith(f"{path} ")), "")
-            raise _of_run(point, error, path) from None
-    return values
+@contextmanager
+def _told(plan: Plan, point: Mapping[str, float]) -> Iterator[None]:
+    """Add the swept values of a run to an error of it."""
+    try:
+        yield
+    except InputError as error:
+        path = next((path for path in point if error.message.startswith(f"{path} ")), "")
+        given = ", ".join(f"{path} = {plan.told(path, value)}" for path, value in point.items())
+        more = f"This is the run with {given}; a store, -o NAME.zarr, marks such runs and goes on."
+        raise InputError(f"{error.message} {more}", error.place, path=path) from None
 
 
 def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:
@@ -182,7 +169,8 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
         point = {parameter.symbol: at[parameter.path] for parameter in system.parameters}
         start, slope = (float(part.subs({**point, system.t: 0})) for part in (line, derivative(line, system.t)))
         if not (target - start) * slope > 0:
-            message = f"{variable} never reaches {target:g}: it starts at {start:g} and changes by {slope:g}/s."
+            told = f"{target:g} {VARIABLES[variable].unit}: it starts at {start:g} and changes by {slope:g}"
+            message = f"{variable} never reaches {told} each second."
             raise InputError(message, path="sweep.until")
         runs.append(replace(run, times=tuple((shape * ((target - start) / slope)).tolist())))
     return runs
@@ -209,17 +197,17 @@ class SweepAccuracy:
     @property
     def unknown(self) -> str:
         """Number of runs with an unknown error and the reason, in words; '' if there are none."""
-        count = len(self.errors) - len(self.known)
-        return unknown_in(count, self.why) if count else ""
+        return unknown_in(len(self.errors) - len(self.known), self.why)
 
 
 def unknown_in(count: int, why: str) -> str:
-    """Describe the number of runs with an unknown error, and the reason.
+    """Describe the number of runs with an unknown error, and the reason; '' if there are none.
 
     >>> unknown_in(2, "unknown: the run ended at its start")
     'unknown in 2 runs: the run ended at its start'
     """
-    return f"unknown in {': '.join(filter(None, (counted(count, 'run'), why.removeprefix('unknown: '))))}"
+    said = ": ".join(filter(None, (counted(count, "run"), why.removeprefix("unknown: "))))
+    return f"unknown in {said}" if count else ""
 
 
 def accuracy(
@@ -260,7 +248,7 @@ def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellE
     if done.statistics:
         pairs = zip(done.statistics, second.statistics, cells, strict=True)
         errors = [_of_statistics(ours, theirs) + found.largest for ours, theirs, found in pairs]
-        return errors, "" if all(found.converged for found in cells) else CELLS_UNKNOWN
+        return errors, UNBROKEN if all(found.converged for found in cells) else CELLS_UNKNOWN
     runs = zip(done.runs, second.runs, cells, strict=True)
     found = [with_cells(estimated(ours, theirs), each) for ours, theirs, each in runs]
     return [each.error for each in found], next((each.source for each in found if np.isnan(each.error)), "")
@@ -294,6 +282,7 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
             if i in (begun[0], begun[-1]):
                 exact_values(reference, case.scene, run)
             errors[i] = _of_statistics(done.statistics[i], reference)
+            why = UNBROKEN if np.isnan(errors[i]) else why
             for which, values in exact.items():
                 values[i] = getattr(reference, which)
         else:
@@ -306,7 +295,7 @@ def _of_statistics(found: Rupture, exact: references.Reference | Rupture) -> flo
     """Return the largest error of the load at rupture, or that of the lifetime; absolute if the exact value is zero."""
     pairs = [(getattr(found, each.name), getattr(exact, each.name)) for each in fields(found)]
     errors = [float(abs(ours - true) / abs(true) if true else abs(ours)) for ours, true in pairs]
-    return max(max(errors), EPS)
+    return max(float(np.fmax.reduce(errors)), EPS)
 
 
 # -- the dataset ------------------------------------------------------------------------------------------------------

@@ -458,10 +458,8 @@ def _subjects(
 def subject(simulation: Simulation) -> Subject:
     """Return a case as subject of the study; InputError if it cannot start."""
     case, model = simulation.case, simulation.model
-    try:
+    with case.locating():
         model.problem(case.run, model.values())
-    except InputError as error:
-        raise case.located(error) from None
     return Subject(case, model)
 
 

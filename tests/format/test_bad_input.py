@@ -217,10 +217,17 @@ def test_a_missing_case():
         load("endotermic")
     with pytest.raises(InputError, match=r"^no file and no case 'x/endotermic.yaml'\. Did you mean 'endothermic'\?"):
         load("x/endotermic.yaml")
-    with pytest.raises(InputError, match=r"^no file and no case"):
-        load("a\0b")
-    with pytest.raises(InputError, match=r"^no file and no case"):
-        load("a" * 5000)
+    for name in ("a\0b", "a" * 5000):
+        with pytest.raises(InputError, match=r"^no file and no case"):
+            load(name)
+
+
+def test_what_is_too_long_is_not_quoted_whole():
+    long = "word" * 1250
+    for change in (f"run.{long}=1", f"bodies.lower.temperature={long}", f"interface.friction=[{long}]"):
+        with pytest.raises(InputError, match=r"ordword.*\[\.\.\.\]") as caught:
+            load("exothermic", [change])
+        assert len(str(caught.value)) < 400
 
 
 def test_a_file_beside_is_the_nearest_guess(tmp_path):

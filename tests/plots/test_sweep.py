@@ -13,12 +13,11 @@ from surfacechem.results.store import opened
 pytestmark = pytest.mark.around
 
 K_0, C_R = "interface.potential.bond-energy.K_0", "interface.bonding.linear-affinity.c_r"
+STARTS = [290.0 + k for k in range(8)]
 SAMPLE = {
     "of": {K_0: {"normal": {"mean": 200, "std": 20}}, C_R: {"lognormal": {"median": 6e15, "sigma": 0.2}}},
     "runs": 128,
 }
-
-
 BOND_ENERGY = "Temperature-independent part of the bond energy density (bond-energy)"
 
 
@@ -35,13 +34,9 @@ def drawn(tmp_path_factory):
 
 
 def test_a_map_over_two_parameters(tmp_path):
-    over = {
-        K_0: {"from": 1, "to": 300, "points": 9, "spacing": "logarithmic"},
-        "initial.T": [290 + k for k in range(8)],
-    }
+    over = {K_0: {"from": 1, "to": 300, "points": 9, "spacing": "logarithmic"}, "initial.T": STARTS}
     path = stored(tmp_path, over=over, keep={"last": ["T"]})
-    plot = plots.figure(path)
-    ax = plot.axes[0]
+    ax = plots.figure(path).axes[0]
     assert np.array_equal(ax.collections[0].get_array(), opened(path)["T_last"].values.T)
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "linear")
     words = [" ".join(text.split()) for text in (ax.get_xlabel(), ax.get_ylabel())]
@@ -49,14 +44,13 @@ def test_a_map_over_two_parameters(tmp_path):
 
 
 def test_a_store_shows_bonds_temperatures_and_times_before_all_else(tmp_path):
-    over = {K_0: [100.0, 200.0], "initial.T": [290.0 + k for k in range(8)]}
-    plot = plots.figure(stored(tmp_path, over=over))
+    plot = plots.figure(stored(tmp_path, over={K_0: [100.0, 200.0], "initial.T": STARTS}))
     bars = [ax for ax in plot.axes if not ax.get_xlabel() and "Initial" not in ax.get_ylabel()]
     assert [bar.get_ylabel() for bar in bars] == [r"$\phi_{\mathrm{last}}$ [1]", r"$T_{\mathrm{max}}$ [K]"]
 
 
 def test_what_is_left_of_broken_bonds_is_no_map_and_a_bar_has_no_offset(tmp_path):
-    data = opened(stored(tmp_path, over={K_0: [100.0, 200.0], "initial.T": [290.0 + k for k in range(8)]}))
+    data = opened(stored(tmp_path, over={K_0: [100.0, 200.0], "initial.T": STARTS}))
     rest = data["phi_last"].copy(data=1e-13 * data["phi_last"].values)
     warm = data["T_max"].copy(data=298.0 + 1e-3 * data["phi_last"].values)
     plot = plots.figure(data.assign(phi_last=rest, T_max=warm, T_last=warm))
@@ -67,8 +61,7 @@ def test_what_is_left_of_broken_bonds_is_no_map_and_a_bar_has_no_offset(tmp_path
 
 @pytest.fixture(scope="module")
 def grid():
-    over = {K_0: [200.0, 300.0], "initial.T": [290.0 + k for k in range(8)]}
-    return surfacechem.load("exothermic").sweep(over).dataset
+    return surfacechem.load("exothermic").sweep({K_0: [200.0, 300.0], "initial.T": STARTS}).dataset
 
 
 def test_a_map_of_whole_runs_shows_bonds_at_the_end_and_the_largest_temperatures(grid):
@@ -88,17 +81,13 @@ def test_curves_over_two_parameters_have_the_colours_of_the_first(grid):
 
 
 def test_distributions_and_effects_of_a_sample(drawn):
-    data = opened(drawn)
-    plot = plots.figure(drawn)
-    rows = np.array(plot.axes).reshape(2, 3)
+    rows = np.array(plots.figure(drawn).axes).reshape(2, 3)
     heights = [sum(bar.get_width() for bar in row[0].patches) for row in rows]
     assert heights == [128, 128]
     middle = rows[1, 0].lines[1].get_ydata()[0]
-    assert middle == np.median(data["T_last"].values)
-    assert {" ".join(ax.get_xlabel().split()) for ax in rows[1, 1:]} == {
-        f"{BOND_ENERGY} [J m⁻²]",
-        "Rate constant per bond (linear-affinity) [J⁻¹ s⁻¹]",
-    }
+    assert middle == np.median(opened(drawn)["T_last"].values)
+    names = {" ".join(ax.get_xlabel().split()) for ax in rows[1, 1:]}
+    assert names == {f"{BOND_ENERGY} [J m⁻²]", "Rate constant per bond (linear-affinity) [J⁻¹ s⁻¹]"}
     (effect,) = (ax for ax in rows[1] if ax.get_xlabel().startswith("Temperature"))
     assert np.all(np.diff(effect.lines[0].get_ydata()) > 0)
 
@@ -127,9 +116,8 @@ def test_a_number_of_each_run_is_no_curve_of_it(drawn, grid):
 
 
 def test_what_is_briefer_than_the_outputs_of_a_sweep_is_told():
-    swept = surfacechem.load("stick-slip", ["run.outputs=201"]).sweep(
-        {"mechanics.tangential.k": ["60 MPa/m", "90 MPa/m"]}
-    )
+    case = surfacechem.load("stick-slip", ["run.outputs=201"])
+    swept = case.sweep({"mechanics.tangential.k": ["60 MPa/m", "90 MPa/m"]})
     facts = [ax.get_title(loc="left") for ax in swept.plot(variables=["v", "u_t"], against="time").axes]
     assert "between outputs, $v$ reaches" in facts[0]
     assert "u_{t}" not in facts[0]
@@ -238,6 +226,9 @@ def test_a_figure_of_a_store_tells_the_error_of_its_checked_runs(tmp_path):
     checked = stream.check()
     with stream.store.dataset as data:
         assert f"error {checked.error:.1e} of the checked runs" in plots.figure(data).axes[0].get_title("left")
+        for change, span in ((0.1 * checked.error, 600 * checked.error), (1e-15, 30.0)):
+            close = data.assign(T_last=data["T_last"].copy(data=[300.0, 300.0 * (1 + change)]))
+            assert np.ptp(plots.figure(close, ["T_last"]).axes[0].get_ylim()) == pytest.approx(span)
 
 
 def test_ends_are_those_of_the_runs_also_where_they_stop_between_outputs(tmp_path):
@@ -352,8 +343,8 @@ def test_lifetimes_under_constant_forces_have_a_figure():
 
 def test_survival_is_followed_and_drawn_over_decades():
     """That of each run to a thousandth, whose lifetimes are decades apart, though no times are asked for."""
-    forces = [0.0, 4e-11, 8e-11]
-    data = surfacechem.load("bond-lifetimes", ["run={until: 1 h}"]).sweep({"loading.f": forces}).dataset
+    case = surfacechem.load("bond-lifetimes", ["run={until: 1 h}"])
+    data = case.sweep({"loading.f": [0.0, 4e-11, 8e-11]}).dataset
     _, below = plots.figure(data).axes
     assert below.get_xscale() == "log"
     for line, lifetime in zip(below.get_lines(), data["lifetime"].values, strict=True):
@@ -367,5 +358,7 @@ def test_variables_are_drawn_over_the_load_or_over_the_rate(spectrum):
     assert {ax.get_xlabel() for ax in over_load} == {"Force per bond, tension positive $f$ [pN]"}
     (each,) = plots.figure(spectrum, ["phi"], "f").axes
     assert [len(line.get_xdata()) for line in each.get_lines()] == 3 * [spectrum.sizes["f"]]
+    (alone,) = plots.figure(spectrum, ["lifetime"]).axes  # beside its headings there is no room
+    assert (alone.get_title("right"), alone.get_title("left")[-21:]) == ("", "their curves coincide")
     (over_rate,) = plots.figure(spectrum, ["f_mean"]).axes
     assert over_rate.get_lines()[0].get_xdata().tolist() == [1e-12, 1e-10, 1e-9]

@@ -91,6 +91,12 @@ def test_what_has_no_lifetime_says_so(tmp_path):
         case.stream(case.plan(), tmp_path / "lifetimes.zarr")
 
 
+def test_a_run_that_ends_too_early_determines_no_force_of_rupture():
+    found = surfacechem.load("force-spectroscopy").sweep({RATE: ["100 pN/s"]}, {"f": "3 pN"})
+    assert np.isnan(found.statistics[0].mode)
+    assert found.accuracy.unknown == "unknown in 1 run: the run ended with too many bonds left"
+
+
 def test_bonds_of_a_mechanism_have_a_spectrum():
     data = surfacechem.sweep("l-selectin-tether").dataset
     for one in data["rate"]:
@@ -220,8 +226,9 @@ def test_jumps_of_a_sweep_are_judged_as_those_of_a_run():
         assert data[name].values[0].tobytes() == single.dataset[name].values.tobytes()
         assert np.isnan(data[name].values[2]).all()
     (events,) = (line for line in str(sweep_summary(solution, None)).splitlines() if line.startswith("  events"))
-    assert "2 debond; destroys entropy in 1 of 3 runs, at worst -0." in events
-    assert events.endswith("at t_max = 2e+07")
+    assert "2 debond; debond: destroys entropy in 1 of 3 runs, at worst -0." in events
+    assert events.endswith("at t_max = 20 MPa")
+    assert "no law destroys entropy, jumps do" in str(sweep_summary(solution, None))
     refused = surfacechem.load("debonding", {"interface.limits.tensile-strength.violation": "refuse"})
     data = refused.sweep({t_max: ["20 MPa", "77.46 MPa"]}).dataset
     assert not data["destroys_entropy"].any()
@@ -319,7 +326,7 @@ sweep:
 @pytest.mark.parametrize(
     ("changes", "given", "message"),
     [
-        ("", {}, "case.yaml:10: .*k_off = -1 is outside its range.* run with .*x_off = 1e-10, .*k_off = -1; a store"),
+        ("", {}, "case.yaml:10: .*k_off = -1 is outside .* run with .*x_off = 0.1 nm, .*k_off = -1 1/s; a store"),
         ("", {"over": {"interface.bonding.bell.k_off": [1, -1]}}, "override: .*k_off = -1 is outside its range"),
         ("loading.f=10 pN", {"over": {"initial.phi": [0.5, 1]}}, "case.yaml:7: f is no ramp"),
         ("loading.f=10 pN", {"until": {"f": "20 pN"}}, "override: f is no ramp"),
@@ -344,7 +351,7 @@ def test_command_line(tmp_path, monkeypatch):
     assert done.exit_code == 0, done.output
     labels = ["swept", "solved", "ended", "error", "time", "balances", "written"]
     assert [line.split()[0] for line in done.stdout.splitlines()[1:]] == labels
-    assert "rate (1e-12 to 1e-09 N/s, 2 values)" in done.stdout
+    assert "rate (1 to 1000 pN/s, 2 values), each until f = 1.5e-10 N" in done.stdout
     with xarray.open_dataset("s.nc") as data:
         assert data["phi"].dims == ("rate", "f")
 
