@@ -21,6 +21,7 @@ from functools import cached_property
 from io import BufferedIOBase, TextIOBase
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 from surfacechem import documents, laws
 from surfacechem.contracts.terms import Law
@@ -34,6 +35,9 @@ from surfacechem.model.assemble import assemble, with_surrogates
 from surfacechem.model.system import System
 from surfacechem.scene import Scene
 from surfacechem.solve.run import Run, refuse_static
+
+if TYPE_CHECKING:
+    from surfacechem.format.plans import Plan
 
 FILE_KEYS = ("file", "sha256", "python")
 
@@ -155,12 +159,12 @@ class Case:
             return assemble(self.scene)
 
     @contextmanager
-    def locating(self) -> Iterator[None]:
-        """Add file and line to input errors raised in a block."""
+    def locating(self, plan: Plan | None = None) -> Iterator[None]:
+        """Add file and line to input errors raised in a block, also to those about the parameters of a plan."""
         try:
             yield
         except InputError as error:
-            raise self.located(error) from None
+            raise self.located(plan.located(error) if plan else error) from None
 
     def located(self, error: InputError) -> InputError:
         """Return the error with file and line of its path, or of the innermost section around that."""

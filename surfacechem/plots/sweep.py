@@ -339,7 +339,7 @@ def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], 
     modes = dataset[f"{load}_mode"].values
     # At low loading rates most bonds break before the load grows, and their peak at zero would dwarf all others.
     inside = np.argwhere(modes > dataset[load].values[0])
-    places = inside if len(inside) else np.argwhere(np.isfinite(modes))
+    places = inside if len(inside) else np.argwhere(np.full(modes.shape, True))
     chosen = places[style.evenly_spread(len(places), MOST_CURVES)]
     return [(tuple(at), style.member_name(dataset, at)) for at in chosen.tolist()]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -221,18 +221,14 @@ def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: st
     known = curves(dataset)
     asked = (*(variables or ()), *filter(None, [against]))
     refuse_unknown(asked, known, "no variable '{}' over time in the dataset", style.place_of(dataset))
-    found = _by_unit(dataset, list(dict.fromkeys(variables))) if variables else _by_kind(dataset, known)
-    found = [replace(panel, names=[name for name in panel.names if name != against]) for panel in found]
-    return [panel for panel in found if panel.names]
-
-
-def _by_unit(dataset: xarray.Dataset, names: Sequence[str]) -> list[Panel]:
-    panels = []
-    for wanted in dict.fromkeys(unit(dataset[name]) for name in names):
-        group = [name for name in names if unit(dataset[name]) == wanted]
+    shown, found = [name for name in dict.fromkeys(variables or known) if name != against], []
+    if not variables:
+        return _by_kind(dataset, shown)
+    for wanted in dict.fromkeys(unit(dataset[name]) for name in shown):
+        group = [name for name in shown if unit(dataset[name]) == wanted]
         title = meaning(dataset[group[0]]) if len(group) == 1 else ""
-        panels.append(Panel(title if len(title) < MOST_TITLE_LETTERS else "", wanted, group))
-    return panels
+        found.append(Panel(title if len(title) < MOST_TITLE_LETTERS else "", wanted, group))
+    return found
 
 
 def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:

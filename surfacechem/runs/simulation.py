@@ -357,7 +357,7 @@ class Simulation:
         self, settings: Run, values: Mapping[str, float], plan: Plan | None = None, threads: int | None = None
     ) -> Sequence[Trajectory]:
         """Solve the run with these values, or the runs over a plan: a run is a batch of one."""
-        try:
+        with self.case.locating(plan):
             if plan is None:
                 if settings.steady:
                     from surfacechem.runs.at_rest import to_steady_state
@@ -371,8 +371,6 @@ class Simulation:
             if key not in self._sweep_models:
                 self._sweep_models[key] = Model(sweeps.prepared(self.system, plan)) if key else self.model
             return sweeps.solve(self._sweep_models[key], plan, settings, values, threads)
-        except InputError as error:
-            raise self.case.located(plan.located(error) if plan else error) from None
 
     def _layers(self, *runs: Trajectory) -> dict[str, float]:
         """Return by body the thinnest layer that heat has reached when outputs or events of runs first show it."""
@@ -543,10 +541,8 @@ class Simulation:
             raise InputError(message, path="bodies")
         if plan.until and not plan.load:
             raise InputError("a store keeps no lifetimes. Write the sweep to a file, -o NAME.nc.", path="sweep.until")
-        try:
+        with self.case.locating(plan):
             return streaming.stream(self, plan, path, changes=values, resume=resume, part=part)
-        except InputError as error:
-            raise self.case.located(plan.located(error)) from None
 
     @concise
     def plan(
