@@ -44,7 +44,7 @@ def test_a_column_of_another_name_is_chosen_by_name(tmp_path):
     assert by_name.case.scene.loading["Q_1"].values == [2.0, 2.0]
     only = load(tmp_path, "power [W/m^2], t [s]\n5, 0\n5, 3\n", changes=["loading.Q_1.table.column=power"])
     assert only.case.scene.loading["Q_1"].values == [5.0, 5.0]
-    with pytest.raises(InputError, match=r"case\.yaml: bodies\.lower\.C = -1 is outside"):
+    with pytest.raises(InputError, match=r"case\.yaml:2: bodies\.lower\.C = -1 is outside"):
         only.run({"bodies.lower.C": -1})
     with pytest.raises(InputError, match=r"heat\.csv:2: 5 K is a temperature; Q_1, from the column a, needs a heat"):
         load(tmp_path, "t [s], a [K]\n0, 5\n3, 5\n", changes=["loading.Q_1.table.column=a"])

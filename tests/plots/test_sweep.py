@@ -82,10 +82,8 @@ def test_curves_over_two_parameters_have_the_colours_of_the_first(grid):
 
 def test_distributions_and_effects_of_a_sample(drawn):
     rows = np.array(plots.figure(drawn).axes).reshape(2, 3)
-    heights = [sum(bar.get_width() for bar in row[0].patches) for row in rows]
-    assert heights == [128, 128]
-    middle = rows[1, 0].lines[1].get_ydata()[0]
-    assert middle == np.median(opened(drawn)["T_last"].values)
+    assert [sum(bar.get_width() for bar in row[0].patches) for row in rows] == [128, 128]
+    assert rows[1, 0].lines[1].get_ydata()[0] == np.median(opened(drawn)["T_last"].values)
     names = {" ".join(ax.get_xlabel().split()) for ax in rows[1, 1:]}
     assert names == {f"{BOND_ENERGY} [J m⁻²]", "Rate constant per bond (linear-affinity) [J⁻¹ s⁻¹]"}
     (effect,) = (ax for ax in rows[1] if ax.get_xlabel().startswith("Temperature"))
@@ -158,9 +156,8 @@ def test_effects_of_three_parameters_of_a_grid(tmp_path):
     over = {K_0: [100.0, 200.0, 300.0], "initial.T": [290.0, 310.0], C_R: [5e15, 7e15]}
     path = stored(tmp_path, over=over, keep={"last": ["T"]})
     effect = next(ax for ax in plots.figure(path, ["T_last"]).axes if ax.get_xlabel().startswith("Temperature"))
-    x, y = effect.lines[0].get_data()
-    assert x.tolist() == [100, 200, 300]
-    assert y.tolist() == np.median(opened(path)["T_last"].values, axis=(1, 2)).tolist()
+    middle = np.median(opened(path)["T_last"].values, axis=(1, 2))
+    assert np.array_equal(effect.lines[0].get_data(), [[100, 200, 300], middle])
 
 
 def test_effects_in_a_store_are_in_the_order_of_the_plan_each_with_its_own_scale(tmp_path):
@@ -291,8 +288,7 @@ def words(ax):
 
 def test_lifetimes_are_those_under_a_constant_force_at_every_rate(spectrum):
     exact = np.exp(-spectrum["f"].values * 0.4e-9 / (BOLTZMANN * 300)) / 0.1
-    found = spectrum["lifetime"].values
-    known = np.isfinite(found)
+    found, known = spectrum["lifetime"].values, np.isfinite(spectrum["lifetime"].values)
     assert np.all(known.sum(axis=1) > 30)
     assert np.allclose(found[known], np.broadcast_to(exact, found.shape)[known], rtol=1e-9)
 
@@ -348,9 +344,8 @@ def test_survival_is_followed_and_drawn_over_decades():
     _, below = plots.figure(data).axes
     assert below.get_xscale() == "log"
     for line, lifetime in zip(below.get_lines(), data["lifetime"].values, strict=True):
-        x, y = line.get_data()
         t = np.geomspace(lifetime / 100, 5 * lifetime, 50)
-        assert np.interp(t, x, y) == pytest.approx(np.exp(-t / lifetime), abs=1e-3)
+        assert np.interp(t, *line.get_data()) == pytest.approx(np.exp(-t / lifetime), abs=1e-3)
 
 
 def test_variables_are_drawn_over_the_load_or_over_the_rate(spectrum):
