@@ -640,7 +640,8 @@ class System:
 
     def active_guards(self, parameters: Array) -> tuple[bool, ...]:
         """Return a flag for each guard, moving margins and then edges: active in the modes among the parameters."""
-        return tuple(not when or all(parameters[j] in values for j, values in when) for when in self._when)
+        values = parameters.tolist()
+        return tuple([not when or all(values[j] in each for j, each in when) for when in self._when])
 
     @property
     def guard_conditions(self) -> list[tuple[int, int, float]]:

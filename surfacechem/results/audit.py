@@ -167,17 +167,15 @@ def residuals(totals: Sequence[Total], values: Any, ledger: Array) -> list[tuple
 
     ``values`` has the totals and their parts [..., times] by column, ``ledger`` the accounts [..., times, accounts].
     """
-    # Transitions at the very start are booked before the first output.
-    ledger = ledger - ledger[..., :1, :]
-    found = []
-    for total in totals:
-        residual, *changes = [values[j] - values[j][..., :1] for j in total.variables]
-        own = ledger[..., total.accounts]
-        residual = residual - own[..., : total.booked].sum(axis=-1)
-        exchanged = np.concatenate([own, *[part[..., None] for part in changes]], axis=-1)
-        # NumPy is slow in finding the largest of a few numbers in each of many rows, not of a few rows of many.
-        in_rows = np.abs(exchanged.reshape(*exchanged.shape[:-2], -1).T, order="C")
-        found.append((residual, np.maximum.reduce(in_rows, axis=0, initial=0.0)))
+    # NumPy is slow with a few numbers in each of many rows, not with a few rows of many.
+    accounts, found = np.moveaxis(ledger, -1, 0), []
+    for (whole, *parts), own, booked in totals:
+        amounts = np.array([values[whole], *[accounts[j] for j in own], *[values[j] for j in parts]])
+        # Transitions at the very start are booked before the first output.
+        amounts -= amounts[..., :1].copy()
+        residual = amounts[0] - amounts[1 : 1 + booked].sum(axis=0)
+        exchanged = np.abs(amounts[1:]).max(axis=0, initial=0.0)
+        found.append((residual, np.ascontiguousarray(exchanged.T).max(axis=0, initial=0.0)))
     return found
 
 
@@ -208,15 +206,16 @@ def audit(trajectory: Trajectory) -> Audit:
     energy_scale, entropy_scale = float(exchanged), float(turned)
     if steps:  # a brief load may come and go between outputs; the ends of steps resolve it
         energy_scale = max(energy_scale, largest(steps.ledger[:, energies.accounts]))
-    E, S = (trajectory.column(name) for name in ("E_total", "S_total"))
-    energy_stored = max(trajectory.roundings["E_total"] / EPS, largest(E[0]))
-    entropy_stored = max(trajectory.roundings["S_total"] / EPS, entropy_scale, largest(S[0]))
+    both = [total.variables[0] for total in system.totals]
+    E, S = np.abs(trajectory.tables[0][:, both]).max(axis=0, initial=0.0).tolist()
+    energy_stored = max(trajectory.roundings["E_total"] / EPS, E)
+    entropy_stored = max(trajectory.roundings["S_total"] / EPS, entropy_scale, S)
     roundings, untimed = LAST_DIGITS, 0.0
     if steps and len(steps.t):
         roundings += len(steps.t)
         if system.energy_has_histories:  # a steep one is known only to within the last digits of time
             later = model.evaluate(result, steps.t * (1 + EPS), steps.y, steps.ydot, steps.segment)
-            untimed = largest(later[:, system.output_columns["E_total"]] - E[1])
+            untimed = largest(later[:, system.output_columns["E_total"]] - trajectory.tables[1][:, both[0]])
     rounding = EPS * energy_stored * roundings + untimed
     left = largest(energy)
     if left > rounding + OPEN_BALANCE * TIGHTEST_JUDGED * energy_scale:
@@ -431,10 +430,9 @@ def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]
     """Return the verdict on each pair of rates, over all outputs and steps."""
     found = []
     for pair in trajectory.model.system.notes_of(RatePair):
-        values = trajectory.everywhere(pair.departure)
-        if len(values):  # a run that ends at its start has none
-            low, high = float(np.min(values)), float(np.max(values))
-            found.append(BalanceVerdict(pair.title, low, high, pair.law not in audit.violations))
+        if trajectory.ranges:  # a run that ends at its start has none
+            dissipates = pair.law not in audit.violations
+            found.append(BalanceVerdict(pair.title, *trajectory.ranges[pair.departure], dissipates))
     return tuple(found)
 
 
@@ -492,11 +490,11 @@ def _inaccurate(trajectory: Trajectory, found: Accuracy | None) -> list[str]:
 def _lost_fluxes(trajectory: Trajectory) -> list[str]:
     """Return a warning about fluxes through conductances so large that the temperature difference is roundoff."""
     fluxes = {name: size for name, size in trajectory.roundings.items() if name.startswith("q_")}
-    everywhere, duration = trajectory.everywhere, trajectory.result.t
-    most = max((largest(everywhere(name)) for name in fluxes), default=0.0)
+    sizes = {name: max(-low, high) for name, (low, high) in trajectory.ranges.items()}
+    most, duration = max((sizes.get(name, 0.0) for name in fluxes), default=0.0), trajectory.result.t
     # Heat that roundoff carries over the whole run is compared with the heat content, independent of its zero.
     content = trajectory.roundings.get("E_total", 0.0) / EPS
-    least = ERROR_FLOOR * max(largest(everywhere("E_total")), content)
+    least = ERROR_FLOOR * max(sizes.get("E_total", 0.0), content)
     lost = [name for name, size in fluxes.items() if size > LOST_FLUX * most and size * duration > least]
     advice = "let the two share one temperature, or use the heat_into variables, which are exact"
     return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
@@ -506,8 +504,7 @@ def _extrapolations(trajectory: Trajectory) -> list[str]:
     """Return warnings about laws that the run has used outside their range."""
     found = []
     for limit in trajectory.model.system.notes_of(Range):
-        values = trajectory.everywhere(limit.variable)
-        low, high = float(np.min(values, initial=math.inf)), float(np.max(values, initial=-math.inf))
+        low, high = trajectory.ranges.get(limit.variable, (math.inf, -math.inf))
         rounding = RUN_EPS * max(abs(low), abs(high))
         if low < limit.low - rounding or high > limit.high + rounding:
             span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"

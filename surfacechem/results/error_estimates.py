@@ -167,9 +167,8 @@ def against_exact(
     if not trajectory.model.system.profiles:
         seen = fewer(seen, latest)
     exact = exact_values(reference, scene, seen, to_the_end=True, side=max(SIDE, latest))
-    alike = _off_events(seen, latest)
-    for values in exact.values():  # a solution that ends with an infinite slope has no value at its last moment
-        alike &= np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    # A solution that ends with an infinite slope has no value at its last moment.
+    alike = _off_events(seen, latest) & np.isfinite(np.column_stack([*exact.values()])).all(axis=1)
     ours, known = computed(seen), sizes(seen, named=exact.keys() - states(seen).keys())
     if not alike.all():
         ours, known = ({key: each[key][alike] for key in exact} for each in (ours, known))
@@ -300,8 +299,8 @@ def state_differences(
     """
     found, expected = event_times(ours), event_times(theirs)
     note = difference(found, expected)
-    times, *rows = np.intersect1d(ours.result.times, theirs.result.times, assume_unique=True, return_indices=True)
-    times, rows = times[first:], [own[first:] for own in rows]
+    times = theirs.result.times[among(theirs.result.times, ours.result.times)][first:]
+    rows = [run.result.times.searchsorted(times) for run in (ours, theirs)]
     errors: dict[str, float] = {}
     if first + len(times) > 1:
         alike = clear_of(times, _pairs(found, expected)) if note else agree_at_jumps(times, ours, theirs)
@@ -328,14 +327,15 @@ def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
     Differences within roundoff count as zero. Next to events and breakpoints times are compared instead of values.
     """
     found, expected = event_times(ours), event_times(theirs)
-    times, *rows = np.intersect1d(ours.result.times, theirs.result.times, assume_unique=True, return_indices=True)
+    times = theirs.result.times[among(theirs.result.times, ours.result.times)]
+    rows = [run.result.times.searchsorted(times) for run in (ours, theirs)]
     alike = clear_of(times, _pairs(found, expected) + [(t, t) for t in ours.result.problem.segments])
     if not difference(found, expected):
         alike &= agree_at_jumps(times, ours, theirs)
     first, second = (run.picked(own[alike]) for run, own in zip((ours, theirs), rows, strict=True))
     names, true = second.model.system.output_columns, second.outputs
     rounded = RUN_ERROR * np.array(list(second.sample.roundings.values()))
-    size = np.transpose(list(map(sizes(second, named=names).__getitem__, names)))
+    size = _named_sizes(second, [*names.values()])
     with np.errstate(invalid="ignore"):  # infinite values of both are equal
         missed = np.fmax(np.abs(first.outputs - true) - rounded, 0.0)
     errors = np.fmax.reduce(np.divide(missed, size, out=np.zeros_like(missed), where=size > 0), initial=0.0)
@@ -356,19 +356,24 @@ def _squares(rtol: float, trajectory: Trajectory, least: Array) -> list[str]:
     return [name for name, is_one in zip(trajectory.model.system.output_columns, squares, strict=True) if is_one]
 
 
-def _changes(trajectory: Trajectory, columns: list[int]) -> Array:
-    """Return the changes of some named quantities within the elapsed time, at the rates of the outputs."""
+def _named_sizes(trajectory: Trajectory, columns: list[int]) -> Array:
+    """Return the sizes of some named quantities at the outputs: the largest value, or the change within the elapsed
+    time, at the rates there, if that is more.
+    """
     result = trajectory.result
     passed = SQRT_EPS * result.times
     y, segment = result.outputs + passed[:, None] * trajectory.rates, result.segments_at(result.times, result.segment)
     later = trajectory.at(States(result.times + passed, y, result.ledger_outputs, segment))
+    values = trajectory.outputs[:, columns]
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(later.outputs[:, columns] - trajectory.outputs[:, columns]) / SQRT_EPS)
+        changes = np.abs(later.outputs[:, columns] - values) / SQRT_EPS
+    return np.asarray(np.fmax(np.abs(values).max(axis=0, initial=0.0), changes))
 
 
 def _compared(trajectory: Trajectory, also: Collection[str]) -> dict[str, Array]:
     """Return the states at the output times, and some named quantities; without states the exchanged amounts."""
-    own = states(trajectory) or exchanged(trajectory)
+    names = [account.quantity.name for account in trajectory.model.system.ledger]
+    own = states(trajectory) or dict(zip(names, trajectory.result.ledger_outputs.T, strict=True))
     return own | {name: each for name, each in computed(trajectory).items() if name in also} if also else own
 
 
@@ -400,6 +405,8 @@ def clear_of(times: Array, pairs: Sequence[tuple[float, float]] | Array) -> Mask
     >>> clear_of(np.array([0.5, 1.0, 2.5, 4.0]), [(2.0, 3.0), (1.0, 1.0)]).tolist()
     [True, False, False, True]
     """
+    if not len(pairs):
+        return np.ones(len(times), bool)
     early, late = np.sort(np.sort(np.reshape(pairs, (-1, 2)), axis=1), axis=0).T
     begun = np.searchsorted(early * (1 - SIDE), times, side="right")
     return np.asarray(begun == np.searchsorted(late * (1 + SIDE), times))  # as many have ended
@@ -432,12 +439,6 @@ def states(trajectory: Trajectory) -> dict[str, Array]:
     return found | {profile.name: profile_values(trajectory, profile) for profile in system.profiles}
 
 
-def exchanged(trajectory: Trajectory) -> dict[str, Array]:
-    """Return the accounts of the ledger at the output times, by name."""
-    names = [account.quantity.name for account in trajectory.model.system.ledger]
-    return dict(zip(names, trajectory.result.ledger_outputs.T, strict=True))
-
-
 def computed(trajectory: Trajectory) -> dict[str, Array]:
     """Return states and named quantities at the output times, by name."""
     return states(trajectory) | dict(zip(trajectory.model.system.output_columns, trajectory.outputs.T, strict=True))
@@ -461,9 +462,7 @@ def sizes(trajectory: Trajectory, named: Collection[str] = ()) -> dict[str, Arra
         floor = max((float(least[system.state_columns[state]]) for state in profile.states), default=0.0)
         found[profile.name] = np.full((len(result.times), 1), floor)
     if own := {name: column for name, column in system.output_columns.items() if name in named}:
-        columns = [*own.values()]
-        largest = np.abs(trajectory.outputs[:, columns]).max(axis=0, initial=0.0)
-        found |= zip(own, np.fmax(largest, _changes(trajectory, columns)).T, strict=True)
+        found |= zip(own, _named_sizes(trajectory, [*own.values()]).T, strict=True)
     if len(own) < len(named):
         found |= {name: np.full(len(result.times), size) for name, size in _exchanged_sizes(trajectory).items()}
     end, speed, size = trajectory.run.times[-1], np.abs(trajectory.rates), np.maximum(np.abs(result.outputs), least)

@@ -84,11 +84,11 @@ def exact_values(
     probed = tested and len(times) > 1 and not reference.continuous
     probes, since = _probes(*_edges(run)) if probed else (np.empty(0), np.empty(0))
     step = DIFFERENCE_STEP * since
-    around = [probes + k * step for k in (-2, -1, 0, 1, 2)]
+    around = probes + np.multiply.outer(np.arange(-2, 3), step)
     # All times in one call, as the cost of an exact solution is per call.
-    every = solution(np.concatenate([times, before_end, *around]))
+    every = solution(np.concatenate([times, before_end, around.ravel()]))
     first = len(times) + len(before_end)
-    exact = {each: values[: len(times)].copy() for each, values in every.items()}
+    exact = {each: values[: len(times)] for each, values in every.items()}
     _choose_sides(
         exact,
         {each: values[len(times) : first] for each, values in every.items()},
@@ -124,13 +124,14 @@ def _choose_sides(
             _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
         if near[-1]:
             return
-    jumped = {
-        name: np.array([close])
-        for name, (close, far) in ((name, values.tolist()) for name, values in before_end.items())
-        if abs(exact[name][-1] - close) > JUMP_RATIO * abs(close - far) + EQUAL * abs(close)
-    }
-    if jumped:
-        _take_nearer(exact, jumped, run, times >= times[-1] * (1 - SIDE))
+    last, (close, far) = (
+        np.array([values[-1] for values in exact.values()]),
+        np.reshape([*before_end.values()], (-1, 2)).T,
+    )
+    jumped = np.abs(last - close) > JUMP_RATIO * np.abs(close - far) + EQUAL * np.abs(close)
+    if jumped.any():
+        others = {name: close[k : k + 1] for k, name in enumerate(before_end) if jumped[k]}
+        _take_nearer(exact, others, run, times >= times[-1] * (1 - SIDE))
 
 
 def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Trajectory, at: NDArray[np.bool_]) -> None:
@@ -208,7 +209,7 @@ def _with_profiles(reference: Reference, exact: Mapping[str, Array], scene: Scen
 def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
     """Return exact values under the names of the scene; variables that it does not have are left out."""
     system = run.model.system
-    known = system.state_columns | system.output_columns
+    known = system.variable_columns
     temperatures = [name for name, state in system.own_states.items() if state.is_temperature]
     rates = [own for own in known if own.startswith("R_")]
     # Variables with another name in exact solutions.

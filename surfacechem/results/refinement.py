@@ -52,19 +52,19 @@ def needed_rows(t: Array, values: Array, allowed: Array, kept: Mask) -> Mask:
     """
     kept = kept.copy()
     kept[[0, -1]] = True
-    scaled = np.divide(values, allowed[:, None], out=np.zeros(values.shape), where=allowed[:, None] > 0)
+    scaled = values / np.where(allowed > 0, allowed, np.inf)[:, None]
     ways = np.array([t, np.log(np.maximum(t, t[t > 0].min(initial=1.0)))])
     lines = np.floor(np.cumsum(_lines(ways, scaled)))
     kept[1:] |= lines > np.concatenate((np.zeros(1), lines[:-1]))
-    rows = np.flatnonzero(~kept)
+    rows = (~kept).nonzero()[0]
     while len(rows):
-        ends = np.flatnonzero(kept)
+        ends = kept.nonzero()[0]
         interval = ends.searchsorted(rows)
         left, right, most, last = ends[interval - 1], ends[interval], np.zeros(len(ends)), np.zeros(len(ends), np.int64)
         missed = _missed(ways, scaled, left, rows, right)
         np.maximum.at(most, interval, missed)
         # The worst row of each interval that a line misses; rows in other intervals are done.
-        again, worst = most[interval] > 1, np.flatnonzero((missed > 1) & (missed == most[interval]))
+        again, worst = most[interval] > 1, ((missed > 1) & (missed == most[interval])).nonzero()[0]
         last[interval[worst]] = rows[worst]
         kept[last] = True
         rows = rows[again & ~kept[rows]]
@@ -183,12 +183,12 @@ def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States
         parameters = problem.parameters[segment[left]]
         states = consistent(problem.program, middle, states, rates[left], parameters).y
     between = trajectory.at(States(middle, states, result.ledger_outputs[left], segment[left]))
-    lines = (trajectory.outputs[left] + trajectory.outputs[right]) / 2
+    lines = (trajectory.outputs.take(left, axis=0) + trajectory.outputs.take(right, axis=0)) / 2
     with np.errstate(invalid="ignore"):  # quantities may be infinite
         apart = np.abs(between.outputs - lines)
     allowed, varies = (each[len(each) - apart.shape[1] :] for each in (resolution.allowed, resolution.varies))
     missed = (apart[:, varies] / allowed[varies]).max(axis=1, initial=0.0)
-    if not np.any(missed > 1):
+    if not (missed > 1).any():
         return []
     rows = np.sort(np.argsort(-missed, kind="stable")[:MOST_REFINED])
     rows = rows[missed[rows] > 1]

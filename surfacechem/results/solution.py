@@ -205,10 +205,9 @@ class Solution(Results):
 
     def _reaction(self) -> dict[str, str]:
         """Return the class of the reactions, if they have a heat; heat within the tolerance counts as zero."""
-        heat = self.trajectory.everywhere("q_reaction")
-        if not len(heat):
+        if "q_reaction" not in self.trajectory.ranges:
             return {}
-        low, high = float(heat.min()), float(heat.max())
+        low, high = self.trajectory.ranges["q_reaction"]
         felt = self.trajectory.run.rtol * max(-low, high)
         found = [name for name, most in (("exothermic", high), ("endothermic", -low)) if most > felt]
         return {"reaction": " and ".join(found) or "isothermic"}

@@ -256,11 +256,12 @@ class Trajectory:
         """
         result, rows = self.result, self.known
         t = np.minimum(rows.t, self.run.times[-1])  # the last step may end beyond it by rounding
-        kept = np.append(True, t[1:] > t[:-1])  # of the two sides of a moment keep the first, as an output does
+        kept = np.ones(len(t), bool)
+        np.greater(t[1:], t[:-1], out=kept[1:])  # of the two sides of a moment keep the first, as an output does
         if (result.known or result.inside) is not None and result.steps is not None:
             kept &= among(rows.t, result.steps.t) | ~among(rows.t, result.times)
         rows = rows._replace(t=t)
-        return self.at(rows if kept.all() else rows.picked(kept))
+        return self.at(rows if kept.all() else rows.picked(kept.nonzero()[0]))
 
     @cached_property
     def _inputs(self) -> Array:
@@ -327,6 +328,13 @@ class Trajectory:
         return [np.concatenate((self.result.outputs, self.outputs), axis=1), *self._at_steps]
 
     @cached_property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Least and largest value of each state and named quantity over outputs and steps; empty without any."""
+        every = np.concatenate(self.tables)
+        ends = zip(every.min(axis=0).tolist(), every.max(axis=0).tolist(), strict=True) if len(every) else ()
+        return dict(zip(self.model.system.variable_columns, ends, strict=False))
+
+    @cached_property
     def _at_steps(self) -> list[Array]:
         """Variables at every step, which do not depend on the outputs."""
         if (steps := self.result.steps) is None or not len(steps.t):
@@ -352,7 +360,7 @@ class Trajectory:
     def within_bounds(self) -> Trajectory:
         """The trajectory with bonding states that roundoff has made negative set to zero."""
         result, steps, least = self.result, self.result.steps, self.model.system.least_states
-        if np.all(result.outputs >= least) and (steps is None or np.all(steps.y >= least)):
+        if (result.outputs >= least).all() and (steps is None or (steps.y >= least).all()):
             return self
         steps = steps and replace(steps, y=np.maximum(steps.y, least))
         clipped = result._replace(outputs=np.maximum(result.outputs, least), steps=steps)

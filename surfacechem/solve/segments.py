@@ -47,16 +47,12 @@ def segments(system: System, end: float, values: Mapping[str, float]) -> Array:
 def segment_parameters(system: System, segments: Array, rtol: float, values: Mapping[str, float]) -> Array:
     """Return the parameters of each segment: loads as they start it, bounds with the slack that the tolerance needs."""
     starts = segments[:-1]
-    rows = np.repeat([[values[parameter.path] for parameter in system.parameters]], len(starts), axis=0)
+    slack = min(max(values.get("run.slack", 0.0), BETWEEN_POINTS * rtol), LARGEST_SLACK)
+    given = {**values, "run.slack": slack, RTOL_PATH: rtol, END_PATH: segments[-1]}
+    rows = np.array([[given[parameter.path] for parameter in system.parameters]] * len(starts), dtype=float)
     for j, parameter in enumerate(system.parameters):
         if parameter.load is not None:
             rows[:, j] = [parameter.at(float(start)) for start in starts]
-        elif parameter.path == "run.slack":
-            rows[:, j] = min(max(values[parameter.path], BETWEEN_POINTS * rtol), LARGEST_SLACK)
-        elif parameter.path == RTOL_PATH:
-            rows[:, j] = rtol
-        elif parameter.path == END_PATH:
-            rows[:, j] = segments[-1]
     return rows
 
 
