@@ -15,9 +15,10 @@ import secrets
 import shutil
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,12 @@ MARKS_FOLDER = ".marks"
 
 COORDINATE_PART = 2**20
 """Number of values of a coordinate that are written at a time."""
+
+COMPRESSION = 0
+"""Level of compression of stored arrays: the usual one of Zarr."""
+
+MISSING = {"f": np.nan, "i": -1}
+"""What stands for a missing value, by the kind of the type."""
 
 CHUNK_BYTES = 64 * 2**20
 """Size of a chunk of all variables together."""
@@ -146,14 +153,28 @@ class Store:
         return self.path / MARKS_FOLDER
 
     def write(self, number: int, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Write a chunk, and then its mark."""
-        region = self.layout.region(number)
-        shape = tuple(part.stop - part.start for part in region)
+        """Write a chunk, its arrays side by side, and then its mark."""
         with self.writing():
-            for name in self.layout.variables:
-                values = columns[name]
-                self._array(name)[region] = values.reshape(*shape, *values.shape[1:])
+            with ThreadPoolExecutor() as pool:
+                list(pool.map(partial(self._write, number, columns), self.layout.variables))
             self.mark(str(number), self.checksum(number))
+
+    def _write(self, number: int, columns: Mapping[str, NDArray[Any]], name: str) -> None:
+        """Write the file of an array as Zarr does, none if all values are missing.
+
+        Its event loop would take longer than to compress.
+        """
+        from numcodecs.zstd import Zstd
+
+        values, kind, file = columns[name], np.dtype(self.layout.variables[name].kind), self._file(number, name)
+        shape = tuple(part.stop - part.start for part in self.layout.region(number))
+        whole = np.full((*self.layout.chunk, *values.shape[1:]), MISSING[kind.kind], kind.newbyteorder("<"))
+        whole[tuple(map(slice, shape))] = values.reshape(*shape, *values.shape[1:])
+        if np.all((whole != whole) | (whole == MISSING[kind.kind])):
+            file.unlink(missing_ok=True)
+            return
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(Zstd(COMPRESSION).encode(whole))
 
     def write_unchunked(self, columns: Mapping[str, NDArray[Any]]) -> None:
         """Write whole arrays that do not belong to chunks."""
@@ -178,13 +199,17 @@ class Store:
     def checksum(self, number: int) -> str:
         """Return the checksum of the files of a chunk; arrays whose values are all missing have no file."""
         found = hashlib.sha256()
-        places = "/".join(map(str, np.unravel_index(number, self.layout.counts)))
-        for name, variable in self.layout.variables.items():
-            inner = "/0" * (len(variable.dimensions) - len(self.layout.runs))
-            # Of the files, since data may be damaged on the disk. Zarr writes no file if all values are missing.
-            file = self.path / name / f"c/{places}{inner}"
+        for name in self.layout.variables:
+            # Of the files, since data may be damaged on the disk.
+            file = self._file(number, name)
             found.update(file.read_bytes() if file.exists() else b"")
         return found.hexdigest()
+
+    def _file(self, number: int, name: str) -> Path:
+        """Return the file of an array in a chunk."""
+        places = "/".join(map(str, np.unravel_index(number, self.layout.counts)))
+        inner = "/0" * (len(self.layout.variables[name].dimensions) - len(self.layout.runs))
+        return self.path / name / f"c/{places}{inner}"
 
     def read(self, name: str, number: int) -> NDArray[Any]:
         """Return the values of an array in a chunk, one row per run."""
@@ -301,12 +326,12 @@ def _make(path: Path, layout: Layout) -> None:
     for name, item in {**layout.variables, **layout.unchunked}.items():
         shape = tuple(layout.sizes[dimension] for dimension in item.dimensions)
         part = (*layout.chunk, *shape[len(layout.chunk) :]) if name in layout.variables else shape
-        attributes, along = dict(item.attributes), item.dimensions
-        missing = np.nan if item.kind.startswith("float") else -1
-        made = group.create_array(
-            name, shape=shape, chunks=part, dtype=item.kind, dimension_names=along, fill_value=missing
-        )
-        made.update_attributes(attributes)
+        packed = {
+            "compressors": zarr.codecs.ZstdCodec(level=COMPRESSION),
+            "fill_value": MISSING[np.dtype(item.kind).kind],
+        }
+        named = {"dimension_names": item.dimensions, "attributes": dict(item.attributes)}
+        group.create_array(name, shape=shape, chunks=part, dtype=item.kind, **packed, **named)
     for column in layout.coordinates:
         values = column.values
         made = group.create_array(

@@ -24,7 +24,6 @@ from surfacechem.runs.keeping import REACHES, STATUSES, Columns, Keep, crossed, 
 from surfacechem.solve import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
-from surfacechem.solve.jumps import velocity_scales
 from surfacechem.solve.lanes.lane_batch import solve_batch
 from surfacechem.solve.radau.solver import Room, consistent, put_rates, solve_arrays
 from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
@@ -159,15 +158,11 @@ class ArrayRuns:
         """Columns of the guards of impacts."""
         self.no_peaks = np.zeros((1, model.program.n_ledger + model.program.n_margins))
         """Largest accounts and guards before any evaluation: zero."""
-        self.shape = self._shape(self.keeps_extremes or bool(keep.series), keep.balances)
-        """Output times of a run of the case; none if nothing is kept of them."""
+        times = self.problem.times
+        self.shape = times if self.keeps_extremes or keep.series else times[[0, -1]][: 2 * keep.balances]
+        """Output times of a run of the case: all, or the first and the last, or none."""
         self.keeps_course = bool(len(self.shape))
         """True if more is kept than ends and events."""
-
-    def _shape(self, course: bool, ends: bool) -> Array:
-        """Return the output times of a run of the case: all, or the first and the last, or none."""
-        times = self.problem.times
-        return times if course else times[[0, -1]] if ends else times[:0]
 
     def _first_problem(self, changes: Mapping[str, float]) -> Problem:
         """Return the problem of the first admissible run; InputError if none of the first FIRST_RUNS is admissible."""
@@ -189,7 +184,7 @@ class ArrayRuns:
         rates = {state.dot for state in system.states}
         found = [expression for _, expression in system.limits if not expression.free_symbols & rates]
         certain = [expression - GUARD_EPS * magnitude(expression) for expression in found]
-        return compile_function(system.inputs, certain) if found else None
+        return compile_function(system.inputs, certain, steps=True) if found else None
 
     @cached_property
     def ramp(self) -> Function | None:
@@ -303,15 +298,9 @@ class ArrayRuns:
         if jumper is None or program.margins is None:
             return self.no_peaks, np.ones(count, dtype=bool)
         # The same magnitudes as at the start of a single run, where nothing has been evaluated before.
-        first = len(model.margins)
-        scales = velocity_scales(model.system)
-        y = rows[:, 1 : 1 + self.n]
-        given = np.empty((count, rows.shape[1] + self.n))
-        given[:, : -self.n] = rows
-        np.maximum(scales, np.abs(y), out=given[:, -self.n :])
-        sizes = jumper.magnitudes(given)
+        first, y, seen = len(model.margins), rows[:, 1 : 1 + self.n], rows
+        sizes = jumper.first_magnitudes(rows)
         sizes = sizes if np.isfinite(sizes.sum()) else np.nan_to_num(sizes)
-        seen = rows
         if jumper.guards_read_rates:
             point = consistent(program, np.zeros(count), y, np.zeros_like(y), rows[:, 1 + 2 * self.n :])
             seen = np.concatenate([rows[:, :1], point.y, point.ydot, rows[:, 1 + 2 * self.n :]], axis=1)
@@ -331,8 +320,9 @@ class ArrayRuns:
         batch, counts = found.batch, found.batch.counts
         status, reason, clear = self._verdicts(found)
         # A run that overflows its tables, or ends before its first output, is solved by itself.
-        clear &= (counts[:, EVENTS] <= batch.events.shape[1]) & ((counts[:, OUTPUTS] > 0) | (not self.keeps_course))
-        clear &= (counts[:, RECORDS] <= batch.records.shape[1]) | (not self.keeps_steps)
+        for which, table, matters in ((EVENTS, batch.events, True), (RECORDS, batch.records, self.keeps_steps)):
+            clear &= counts[:, which] <= table.shape[1] if matters else True
+        clear &= counts[:, OUTPUTS] > 0 if self.keeps_course else True
         columns: Columns = {
             "status": status,
             "reason": reason,
@@ -359,7 +349,7 @@ class ArrayRuns:
     def _verdicts(self, found: Ends) -> tuple[Any, Any, Mask]:
         """Return codes of status and reason, and the mask of runs for which both are certain."""
         model, batch = self.model, found.batch
-        outcome = batch.counts[:, END]
+        outcome = batch.counts[:, END].copy()
         ended, stopped = outcome == Status.FINISHED, outcome == Status.EVENT
         reason = np.full(len(outcome), self.reasons.index(self.reasons[0]), np.int16)
         whole = model.jumper is None or self.jumps
@@ -368,7 +358,7 @@ class ArrayRuns:
             self._stops(found, stopped, reason, clear)
         elif not whole:  # a gap may have closed without an event
             clear &= all_above(batch.ends[:, -model.program.n_margins :], -PICOMETRE, self.impacts)
-        return np.where(stopped, STATUSES.index("stopped"), 0).astype(np.int8), reason, clear
+        return stopped * np.int8(STATUSES.index("stopped")), reason, clear
 
     def _stops(self, found: Ends, stopped: Mask, reason: Any, clear: Mask) -> None:
         """Set the reasons of runs stopped by a limit; a run that its own rates lead back from it is not certain."""

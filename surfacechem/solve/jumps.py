@@ -142,13 +142,23 @@ class Jumper:
     @cached_property
     def magnitudes(self) -> Function:
         """Running error bounds of limits and guards, as functions of inputs and peaks of the states; one a model."""
+        peaks = [symengine.Symbol(f"peak of {state.name}") for state in self.system.states]
+        return compile_function([*self.system.inputs, *peaks], self._bounds(peaks))
+
+    @cached_property
+    def first_magnitudes(self) -> Function:
+        """The same as functions of the inputs at a start, where the peaks are those of the states alone."""
+        sizes = zip(self.system.states, velocity_scales(self.system).tolist(), strict=True)
+        peaks = [symengine.Max(size, symengine.Abs(state.symbol)) for state, size in sizes]
+        return compile_function(self.system.inputs, self._bounds(peaks), steps=True)
+
+    def _bounds(self, peaks: list[symengine.Expr]) -> list[symengine.Expr]:
         system = self.system
-        peaks = {state.symbol: symengine.Symbol(f"peak of {state.name}") for state in system.states}
+        known = dict(zip((state.symbol for state in system.states), peaks, strict=True))
         # A rate is known to the roundoff of its state, divided by the time that has passed.
-        peaks |= {state.dot: peaks[state.symbol] / system.t for state in system.states}
+        known |= {state.dot: peak / system.t for state, peak in zip(system.states, peaks, strict=True)}
         guards = [m.expression for m in system.event_margins] + [edge.guard for edge in system.edges]
-        bounds = [magnitude(system.expand(guard), peaks) for guard in guards]
-        return compile_function([*system.inputs, *(peaks[state.symbol] for state in system.states)], bounds)
+        return [magnitude(system.expand(guard), known) for guard in guards]
 
     @cached_property
     def times_of_return(self) -> Function:

@@ -70,15 +70,6 @@ def _dips(w: Any, m: int, a: float, b: float, c: float) -> Any:
 
 
 @compiled
-def _put_margins(w: Any) -> None:
-    """Evaluate the guards at the current inputs, and keep the last two evaluations."""
-    for m in range(w.n_margins):
-        put(w.margin_earlier[m], lanes(w.margin_before[m]))
-        put(w.margin_before[m], lanes(w.margin[m]))
-    evaluate(w, MARGINS, w.margin)
-
-
-@compiled
 def may_cross(w: Any, good: Any) -> Any:
     """Mask of lanes whose guards need a scan of the step.
 
@@ -118,7 +109,10 @@ def _scan(w: Any, searched: Any) -> None:
     for i in range(SCAN_FRACTIONS.shape[0]):
         x = SCAN_FRACTIONS[i]
         put_inside(w, same(x))
-        _put_margins(w)
+        for m in range(w.n_margins):  # the last two evaluations are kept
+            put(w.margin_earlier[m], lanes(w.margin_before[m]))
+            put(w.margin_before[m], lanes(w.margin[m]))
+        evaluate(w, MARGINS, w.margin)
         found = same(0.0)
         for m in range(w.n_margins):
             if w.kinds[m, 4] == 0:

@@ -71,9 +71,8 @@ def _end(w: Any, lane: int, status: int) -> None:
     counts = w.counts[i]
     counts[END], counts[RECORDS] = status, 1 + int(w.steps[lane])
     _write_state(w, w.ends[i], lane)
-    counters = int(w.steps[lane]), int(w.rejected[lane]), int(w.evaluations[lane])
-    for k, counter in enumerate(counters):
-        counts[FIRST_COUNTER + k] = counter
+    for k, counter in enumerate((w.steps[lane], w.rejected[lane], w.evaluations[lane])):
+        counts[FIRST_COUNTER + k] = int(counter)
     w.over[lane] = i
     w.ended += 1
     _leave(w, lane)
@@ -109,8 +108,7 @@ def _begin(w: Any, lane: int, i: int) -> None:
     """Begin run i in a lane."""
     w.run[lane], w.segment[lane], w.busy[lane], w.most_steps[lane] = i, 0, 1.0, w.max_steps[row_of(w.max_steps, i)]
     w.free -= 1
-    w.steps[lane] = w.rejected[lane] = w.failed[lane] = w.stiff_steps[lane] = w.landing[lane] = 0.0
-    w.evaluations[lane] = 0.0
+    w.steps[lane] = w.rejected[lane] = w.evaluations[lane] = w.failed[lane] = w.stiff_steps[lane] = w.landing[lane] = 0
     peaks = w.peaks[row_of(w.peaks, i)]
     for m in range(w.n):
         w.y[m, lane] = w.y0[i, m]
@@ -341,16 +339,6 @@ def _conclude_all(w: Any) -> None:
 
 
 @compiled
-def _doubtful(w: Any) -> Any:
-    """Mask of lanes whose runs are given up: their guards are unclear, or explicit steps make no progress."""
-    slow = (lanes(w.failed) > float(MOST_TRIALS)) | (lanes(w.stiff_steps) >= 2.0 * STIFF_STEPS)
-    spent = lanes(w.steps) + lanes(w.rejected) >= lanes(w.most_steps)
-    # A step onto a guard may be shorter than time resolves: near rupture the state changes by much within it.
-    stuck = (lanes(w.landing) < 0.5) & ~(lanes(w.proposed) > ULPS * lanes(w.t))
-    return (lanes(w.unclear) > 0.5) | slow | spent | stuck
-
-
-@compiled
 def _continue_all(w: Any) -> None:
     """Go on after the steps: where one ends at an event, a segment or the run; where a run is given up."""
     taken = lanes(w.taken) > 0.5
@@ -359,7 +347,12 @@ def _continue_all(w: Any) -> None:
         if w.pending[lane] > 0.5:
             _record(w, lane)
             _go_on(w, lane)
-    for lane in range(LANES if _are_pending(w, _doubtful(w)) else 0):
+    # Guards are unclear, or explicit steps make no progress.
+    slow = (lanes(w.failed) > float(MOST_TRIALS)) | (lanes(w.stiff_steps) >= 2.0 * STIFF_STEPS)
+    spent = lanes(w.steps) + lanes(w.rejected) >= lanes(w.most_steps)
+    # A step onto a guard may be shorter than time resolves: near rupture the state changes by much within it.
+    stuck = (lanes(w.landing) < 0.5) & ~(lanes(w.proposed) > ULPS * lanes(w.t))
+    for lane in range(LANES if _are_pending(w, (lanes(w.unclear) > 0.5) | slow | spent | stuck) else 0):
         if w.pending[lane] > 0.5:
             _give_up(w, lane)
 
@@ -375,8 +368,7 @@ def _write_margins(w: Any) -> None:
         evaluate(w, MARGINS, w.margin)
     for lane in range(LANES):
         if w.over[lane] >= 0:
-            i = w.over[lane]
-            end = w.ends[i]
+            i, end = w.over[lane], w.ends[w.over[lane]]
             for m in range(w.n_margins):
                 end[end.shape[0] - w.n_margins + m] = w.margin[m, lane]
             # The lane waits at a start: beyond an end the rates may take a branch that all lanes would pay for.

@@ -124,10 +124,9 @@ def norm_of(w: Any, row: Any) -> Any:
 @compiled
 def _evaluate_stage(w: Any, i: int) -> None:
     """Evaluate the rates of stage i, and the weighted sum of the earlier stages: of the accounts at the end alone."""
-    h, columns, change = lanes(w.h), w.columns if i == END_STAGE else w.n, w.change
-    if i >= END_STAGE - 1:
-        # What the last two stages have is kept.
-        change = w.change_before if i < END_STAGE else change if i == END_STAGE else w.rates
+    h, columns = lanes(w.h), w.columns if i == END_STAGE else w.n
+    # What the last two stages of a step have is kept.
+    change = w.change_before if i == END_STAGE - 1 else w.change if i <= END_STAGE else w.rates
     _change(i, w.k.ctypes.data, LANES * w.columns, LANES * columns, change.ctypes.data)
     put(w.inputs[0], lanes(w.t) + EXPLICIT_NODES[i] * h)
     for m in range(w.n):
@@ -408,4 +407,4 @@ def check_outputs(w: Any, good: Any) -> None:
 
 @compiled
 def keep_step(w: Any) -> None:
-    """Nothing: an explicit step is not predicted from the last one."""
+    """Nothing: only steps of Radau IIA are predicted from the last one."""

@@ -15,7 +15,7 @@ from surfacechem.compile.rosenbrock import CHANGES, DENSE, STAGES
 from surfacechem.compile.rosenbrock import GAMMA as GAMMA_OF_STAGES
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes.lane_run import CONSTANTS, run_through
-from surfacechem.solve.lanes.lane_step import larger, propose, put_start
+from surfacechem.solve.lanes.lane_step import keep_step, larger, propose, put_start
 from surfacechem.solve.lanes.layout import NUMBERS, ORDER, ROSENBROCK_MEMORY, SIZES
 from surfacechem.solve.lanes.radau_lanes import (
     check_outputs,
@@ -123,11 +123,6 @@ def find_defects(w: Any, lane: int, x: Any) -> None:
     find_errors(w, lane, x)
     for m in range(w.n):
         put(w.rates[m], lanes(w.rates[m]) * w.loose)
-
-
-@compiled
-def keep_step(w: Any) -> None:
-    """Nothing: a step is not predicted from the last one."""
 
 
 _METHOD = {
