@@ -24,14 +24,14 @@ import symengine
 from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import TOTAL_UNITS
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.expressions import Expression, depends
+from surfacechem.expressions import Expression, depends, magnitude
 from surfacechem.model import components, constraints, ledger
 from surfacechem.model.build import Build
 from surfacechem.model.components.sliding_friction import stands_for_velocity
 from surfacechem.model.system import START, Array, ExternalRates, System
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Scene
-from surfacechem.tolerances import CBRT_EPS, EPS
+from surfacechem.tolerances import CBRT_EPS, EPS, GUARD_EPS
 
 AREAL_PATH = "surface"
 """Start of the paths of parameters that are per area in every scene."""
@@ -337,14 +337,19 @@ class StartLimits:
 
 def _value_of(expression: Expression, places: Mapping[Any, int]) -> Callable[[Sequence[float]], float | None]:
     """Return the function for the value of an expression without roundoff, None if a symbol has no number, from the
-    numbers at these places.
+    numbers at these places; if it is positive beyond roundoff, a bound below may stand for it.
     """
     if (terms := _sum(expression, places)) is not None:
         return lambda numbers: math.fsum([factor * numbers[place] for place, factor in terms])
-    known = {x: places[x] for x in expression.free_symbols if x in places}
+    symbols = expression.free_symbols
+    known = {x: places[x] for x in symbols if x in places}
+    certain = cache(lambda: symengine.Lambdify([*known], [expression - GUARD_EPS * magnitude(expression)]))
 
     @lru_cache(maxsize=64)  # runs that differ in other numbers, as a run and its second one, start from the same
     def value(*own: float) -> float | None:
+        # Exact arithmetic takes longer than a brief run: of many starts the first, and those near a limit, need it.
+        if value.cache_info().currsize and len(known) == len(symbols) and (least := float(certain()(own)[0])) > 0:
+            return least
         found = expression.subs(dict(zip(known, map(_exact, own), strict=True)))
         return None if found.free_symbols else float(found)
 

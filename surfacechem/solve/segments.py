@@ -144,6 +144,8 @@ class Passing:
         parts = max(TURN_PARTS / (segments[-1] - segments[0]), PARTS_PER_CYCLE * frequency)
         searched = np.minimum(segments, segments[0] + PARTS_PER_STEP * max_steps / parts)
         found = self._found(searched.tobytes(), table[:, self._columns].tobytes(), parts)
+        if not len(found):
+            return segments, table
         right = np.searchsorted(segments, found)
         gaps = np.minimum(found - segments[right - 1], segments[right] - found)
         found = found[gaps > GUARD_EPS * found]
