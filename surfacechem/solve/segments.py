@@ -163,12 +163,13 @@ class Passing:
         into = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
         low = ends[piece] + into / parts[piece] * np.diff(ends)[piece]
         high = np.append(low[1:], ends[-1])
-        turning = self._zeros(low, high, values[piece], slice(0, self.turns))
-        inner = np.searchsorted(low, turning, side="right") - 1
-        low, high = np.insert(low, inner + 1, turning), np.insert(high, inner, turning)
-        piece = np.insert(piece, inner, piece[inner])
+        turning = self._zeros(low, high, values[piece], slice(0, self.turns)) if self.turns else np.empty(0)
+        if len(turning):
+            inner = np.searchsorted(low, turning, side="right") - 1
+            low, high = np.insert(low, inner + 1, turning), np.insert(high, inner, turning)
+            piece = np.insert(piece, inner, piece[inner])
         passed = self._zeros(low, high, values[piece], slice(self.turns, None))
-        return np.unique(np.concatenate([turning, passed]))
+        return np.union1d(turning, passed) if len(turning) else passed
 
     def _zeros(self, low: Array, high: Array, values: Array, which: slice) -> Array:
         """Return the times at which functions change sign in these intervals, the first time beyond each change."""
@@ -186,7 +187,7 @@ class Passing:
             middle = 0.5 * (low + high)
             ahead = at(middle, values)[rows, j] == side
             low, high = np.where(ahead, middle, low), np.where(ahead, high, middle)
-        return np.unique(high)
+        return np.unique(high) if len(i) else high
 
 
 def _narrow(system: System) -> tuple[list[Expression], list[Expression]]:
