@@ -428,12 +428,10 @@ def in_words(low: float, high: float) -> str:
 
 def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]:
     """Return the verdict on each pair of rates, over all outputs and steps."""
-    found = []
-    for pair in trajectory.model.system.notes_of(RatePair):
-        if trajectory.ranges:  # a run that ends at its start has none
-            dissipates = pair.law not in audit.violations
-            found.append(BalanceVerdict(pair.title, *trajectory.ranges[pair.departure], dissipates))
-    return tuple(found)
+    ranges = trajectory.ranges  # a run that ends at its start has none
+    pairs = trajectory.model.system.notes_of(RatePair) if ranges else ()
+    lawful = [pair.law not in audit.violations for pair in pairs]
+    return tuple(BalanceVerdict(p.title, *ranges[p.departure], own) for p, own in zip(pairs, lawful, strict=True))
 
 
 def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:

@@ -256,8 +256,7 @@ class Trajectory:
         """
         result, rows = self.result, self.known
         t = np.minimum(rows.t, self.run.times[-1])  # the last step may end beyond it by rounding
-        kept = np.ones(len(t), bool)
-        np.greater(t[1:], t[:-1], out=kept[1:])  # of the two sides of a moment keep the first, as an output does
+        kept = np.append(True, t[1:] > t[:-1])  # of the two sides of a moment keep the first, as an output does
         if (result.known or result.inside) is not None and result.steps is not None:
             kept &= among(rows.t, result.steps.t) | ~among(rows.t, result.times)
         rows = rows._replace(t=t)
