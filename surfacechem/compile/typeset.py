@@ -128,8 +128,12 @@ def statements(system: System) -> list[Statement]:
         if item.expression not in levels
     ]
     rows = [line for name, row in system.rows.items() for line in _balance(system, name, row.xreplace(given))]
-    read = quantities_read(named, [line.right for line in rows])
-    return [*rows, *(line for item in reversed(read) for line in _definition(system, item))]
+    return [*rows, *(line for item in _read(named, rows) for line in _definition(system, item))]
+
+
+def _read(named: Sequence[Named], rows: Sequence[Statement]) -> Sequence[Named]:
+    """Return the quantities that the balances read, the last first; all if nothing evolves."""
+    return quantities_read(named, [line.right for line in rows])[::-1] if rows else named
 
 
 def _constant_values(system: System) -> set[Expression]:
@@ -217,7 +221,7 @@ def _without_choice(first: Any, other: Any, low: Any, high: Any) -> Expression |
         return symengine.Abs(low if high == 0 else high)
     if other == 1 and first * high == low:  # cap of rates that time does not resolve
         return other
-    if low == 0 and not other.free_symbols and not first.is_Number:  # a divisor, or the base of a power
+    if low == 0 and not other.free_symbols and high.free_symbols <= first.free_symbols:  # a divisor, a base of a power
         return first.xreplace({symengine.Max(0, high): high})
     return None
 

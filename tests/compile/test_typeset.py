@@ -53,11 +53,8 @@ def test_what_is_shown_holds_wherever_no_guard_is_in_play(name):
 def test_a_slide_and_its_bonds_read_as_in_a_paper():
     found = [(line.left, " ".join(line.pieces), line.when) for line in equations(assembled("stick-slip"))[0]]
     force = r"= \frac{k_{t}\,\left(w_t - u_t\right) - t_{\mathrm{coulomb}}}{m_{t}}"
-    assert found[:3] == [
-        (r"\dot{u}_t", "= v", ""),
-        (r"\dot{v}", force, "slides backward or slides forward"),
-        (r"\dot{v}", "= 0", "sticks"),
-    ]
+    slides = (r"\dot{v}", force, "slides backward or slides forward")
+    assert found[:3] == [(r"\dot{u}_t", "= v", ""), slides, (r"\dot{v}", "= 0", "sticks")]
     rates, symbols = equations(assembled("elastic-bonds-at-a-gap"))
     rate = next(line for line in rates if line.when == "between its bounds")
     assert r"\exp\left(\frac{f\,x_{\mathrm{off}}}{k_{\mathrm{B}}\,T_c}\right)" in rate.pieces[0]
@@ -66,14 +63,19 @@ def test_a_slide_and_its_bonds_read_as_in_a_paper():
 
 def test_what_is_no_guard_stays():
     x, y = symengine.symbols("x y")
-    assert readable(where(x > 0, x, 0.0 * x)) == symengine.Max(0, x)
-    assert readable(where(x < 0, -x, x)) == abs(x)
-    kept = where(x > y, x**2, y)
-    assert readable(kept) == kept
+    assert [readable(where(x > 0, x, 0.0 * x)), readable(where(x < 0, -x, x))] == [symengine.Max(0, x), abs(x)]
+    for kept in (where(x > y, x**2, y), where(x > 0, y, symengine.Integer(0))):
+        assert readable(kept) == kept
 
 
 def as_text(system):
     return [plain(" ".join((line.left, *line.pieces))) for line in equations(system)[0]]
+
+
+def test_every_quantity_is_shown_where_nothing_evolves():
+    bodies, law = {name: {"temperature": "300 K"} for name in "ab"}, {"penalty": {"E_n": "1 MPa/um"}}
+    case = surfacechem.load({"bodies": bodies, "interface": {"potential": [law]}, "loading": {"g_n": 0}})
+    assert "t_n = " in " ".join(as_text(case.system))
 
 
 def test_the_fall_of_friction_has_no_guard_at_rest():
