@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from surfacechem.errors import InputError
 from surfacechem.format.plans import permuted
 from surfacechem.results.store import StoredArray
-from surfacechem.runs.keeping import BALANCES, END_COLUMNS, STATUSES, Keep, RunByRun
+from surfacechem.runs.keeping import BALANCES, END_COLUMNS, EXTREMES, STATUSES, Keep, RunByRun
 from surfacechem.runs.sweeps import SweepAccuracy, SweepSolution, unknown_in
 from surfacechem.solve.contract import Index
-from surfacechem.tolerances import ERROR_FLOOR, RUN_ERROR, TINY
+from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
+from surfacechem.tolerances import EPS, ERROR_FLOOR, FINER_BY, LINE_ERROR, RUN_ERROR, TINY
 
 if TYPE_CHECKING:
-    from surfacechem.runs.streaming import Stream
+    from surfacechem.runs.streaming import ChunkRuns, Stream
 
 Array = NDArray[Any]
 
@@ -86,13 +87,11 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
         found |= {f"{which}_{key}": values for key, values in columns.items()}
         every += accuracies
     store.write_unchunked(found)
-
-    def both(key: str) -> Array:
-        return np.concatenate([found[f"{which}_{key}"] for which in chosen])
-
-    numbers, once = np.unique(both("run"), return_index=True)
+    keys = "run", "error", "destroys_entropy"
+    numbers, errors, destroys = (np.concatenate([found[f"{which}_{key}"] for which in chosen]) for key in keys)
+    numbers, once = np.unique(numbers, return_index=True)
     once = once[numbers >= 0]  # -1 fills up the hardest runs where fewer succeeded
-    errors, destroys = both("error")[once], np.nansum(both("destroys_entropy")[once])
+    errors, destroys = errors[once], np.nansum(destroys[once])
     worst = float(np.fmax.reduce(errors, initial=-np.inf))
     # One source per method: the reason against an exact solution, after the semicolon, differs from run to run.
     sources = {each.source.partition(";")[0]: each.source for each in sorted(every, key=lambda each: len(each.source))}
@@ -134,7 +133,9 @@ def _errors(
 ) -> Iterator[tuple[int, Index, dict[str, Any], SweepAccuracy]]:
     """Yield errors and balances of runs solved by themselves, a portion at a time; nothing for an inadmissible run."""
     chunks = stream.chunks
-    even = replace(chunks.simulation.case.run, picture=None)  # no outputs are shown
+    # No outputs are shown. Extremes lie between the steps, too.
+    looks = LINE_ERROR / FINER_BY**2 if chunks.keep.max or chunks.keep.min else 0.0
+    even = replace(chunks.simulation.case.run, picture=None, looks=looks)
     for first in range(0, len(index), RUNS_AT_ONCE):
         part = index[first : first + RUNS_AT_ONCE]
         try:
@@ -148,34 +149,36 @@ def _errors(
             continue
         assert done.accuracy is not None
         values = {name: [end[name] for end in done.run_ends] for name in BALANCE_COLUMNS}
-        found = np.maximum(done.accuracy.errors, _apart(stream, part, done))  # NaN, an unknown error, stays NaN
+        found = np.maximum(done.accuracy.errors, _apart(chunks, part, done))  # NaN, an unknown error, stays NaN
         yield first, part, {"error": found, **values}, done.accuracy
 
 
-def _apart(stream: Stream, part: Index, done: SweepSolution) -> Array:
+def _apart(chunks: ChunkRuns, part: Index, done: SweepSolution) -> Array:
     """Return the difference between the stored ends of runs and the ends of the same runs solved by themselves, beyond
     roundoff: of states relative to the latter, of other variables, such as fluxes that vanish at rest, relative to
-    their largest values over the run.
+    their largest values over the run. The same for stored extremes, which those of all states that the latter pass
+    through, inside their steps too, may exceed.
 
     For a run stopped by an event only the time counts: there the state may change by any amount within the last digit
     of the time. Runs to a steady state, solved by themselves, all last as long as the slowest of them: only their
     states are compared, relative to their scales at least.
     """
-    chunks = stream.chunks
-    others = tuple(name for name in chunks.keep.last if name not in chunks.model.system.state_columns)
-    keep = Keep(last=chunks.keep.last, max=others, min=others)
-    ends = RunByRun(chunks.model, keep).columns(done.runs, 0, done.audits)
-    over_run = {f"{name}_last": np.fmax(np.abs(ends[f"{name}_max"]), np.abs(ends[f"{name}_min"])) for name in others}
+    kept, states = chunks.keep, chunks.model.system.state_columns
+    wide = {column: name for column, (name, which) in kept.single.items() if which != "last" or name not in states}
+    keep = Keep(last=kept.last, max=(*wide.values(),), min=(*wide.values(),))
+    ends = RunByRun(chunks.model, keep).columns([run.stored for run in done.runs], 0, done.audits)
+    over_run = {at: np.fmax(np.abs(ends[f"{name}_max"]), np.abs(ends[f"{name}_min"])) for at, name in wide.items()}
     stored, largest = chunks.columns(part), np.zeros(len(part))
-    names = "time_reached", *(f"{name}_last" for name in chunks.keep.last)
-    least = {name: ERROR_FLOOR * np.nanmax(np.abs(ends[name]), initial=TINY) for name in names}
+    least = {at: ERROR_FLOOR * np.nanmax(np.abs(ends[at]), initial=TINY) for at in ("time_reached", *kept.single)}
     if chunks.run.steady:
-        scales = {f"{state.name}_last": state.scale for state in chunks.model.system.states}
-        least = {name: scales[name] for name in scales if name in least}
+        least = {f"{s.name}_last": s.scale for s in chunks.model.system.states if s.name in kept.last}
     rounded = [run.sample.roundings for run in done.runs]
+    # Inside steps the states have the error of their polynomial, which is an error of the runs that is known.
+    inside = dict.fromkeys(EXTREMES, max(RUN_ERROR, POLYNOMIAL_ERROR * chunks.run.rtol / EPS))
     for name, floor in least.items():
         size = np.fmax(np.abs(ends[name]), np.fmax(over_run.get(name, 0.0), floor))
-        known = RUN_ERROR * np.array([each.get(name.removesuffix("_last"), 0.0) for each in rounded])
+        of, _, which = name.rpartition("_")
+        known = inside.get(which, RUN_ERROR) * np.array([each.get(of, 0.0) for each in rounded])
         apart = np.nan_to_num(np.fmax(np.abs(stored[name] - ends[name]) - known, 0.0) / size)
         apart[np.isnan(stored[name]) != np.isnan(ends[name])] = np.inf
         counts = (name == "time_reached") | (ends["status"] == STATUSES.index("finished"))

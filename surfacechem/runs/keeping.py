@@ -74,6 +74,11 @@ class Keep:
     balances: bool = True
     """True if the errors of the balances are kept."""
 
+    @property
+    def single(self) -> dict[str, tuple[str, str]]:
+        """Quantity and kind of each column with one number for each run and quantity, by the name of the column."""
+        return {f"{name}_{which}": (name, which) for which in SINGLE_COLUMNS for name in getattr(self, which)}
+
 
 def recorded_keep(record: str) -> Keep:
     """Restore a selection from its record in a store."""
@@ -160,9 +165,8 @@ def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
         if name != "destroys_entropy"  # of the runs that are checked alone
         and (keep.balances or name not in BALANCES)
     }
-    for which, word in SINGLE_COLUMNS.items():
-        for name in getattr(keep, which):
-            found[f"{name}_{which}"] = ("float64", q[name].unit, f"{q[name].long_name} {word}")
+    for column, (name, which) in keep.single.items():
+        found[column] = ("float64", q[name].unit, f"{q[name].long_name} {SINGLE_COLUMNS[which]}")
     for name in keep.events:
         found[f"time_{variable(name)}"] = ("float64", "s", f"first time of the event {name}")
         for state in keep.at_events:

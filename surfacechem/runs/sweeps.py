@@ -45,7 +45,7 @@ from surfacechem.runs.keeping import (
 from surfacechem.runs.listing import counted
 from surfacechem.runs.spectrum import Lifetime, Statistics
 from surfacechem.solve.run import Model, Run, Trajectory
-from surfacechem.tolerances import EPS
+from surfacechem.tolerances import EPS, LINE_ERROR
 
 Rupture = Statistics | Lifetime
 
@@ -155,7 +155,8 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
     """Return the settings of each run: the same output times for all, or times stretched to the moment at which the
     load reaches the value in the plan.
     """
-    run = replace(run, picture=None, looks=0.0)
+    # States inside steps are stored where they are asked for more closely than usual.
+    run = replace(run, picture=None, looks=run.looks if run.looks < LINE_ERROR else 0.0)
     if plan.until is None or not plan.load:
         return [run] * len(values)
     variable, target = plan.until

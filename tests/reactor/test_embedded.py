@@ -28,9 +28,7 @@ def test_fixed_combinations_of_the_rates_of_states(case):
 
 
 def test_slip_turns_as_in_a_run():
-    """What is brief in the run of the case is so in a network, which has no end. The turn is small where slip begins,
-    and what the tolerance of the slips leaves in it is no error.
-    """
+    """What is brief in the run is so in a network, which has no end; tolerances of slips leave a small turn noise."""
     net = ReactorNet([pulled := InterfaceReactor("pulled-at-an-angle")])
     net.rtol, net.atol = 1e-8, 1e-12
     net.advance(0.05)

@@ -47,11 +47,13 @@ def case(name="exothermic", keep=None, over=None, **more):
     return surfacechem.load(name, {"sweep": {"over": over, **({"keep": keep} if keep else {}), **more}, **solver})
 
 
+def begun(simulation, path, **given):
+    return simulation.stream(simulation.plan(), path, **given)
+
+
 def stored(path, simulation=None, **options):
-    simulation = simulation or case(keep=ENDS)
     given = {name: options.pop(name) for name in ("changes", "resume", "part") if name in options}
-    stream = simulation.stream(simulation.plan(), path, **given)
-    return stream.run(options.pop("threads", 1), **options)
+    return begun(simulation or case(keep=ENDS), path, **given).run(options.pop("threads", 1), **options)
 
 
 @pytest.mark.parametrize("balances", ["none", "all"])
@@ -99,7 +101,7 @@ def streams(tmp_path_factory):
     def stream(name, way):
         keep = KEPT | ({"balances": "none"} if way == "bare" else {})
         simulation = case(name, keep, SWEPT[name], **({"solver": "radau"} if way == "named" else {}))
-        made = simulation.stream(simulation.plan(), tmp_path_factory.mktemp(way) / "o.zarr")
+        made = begun(simulation, tmp_path_factory.mktemp(way) / "o.zarr")
         made.run(1)
         return made
 
@@ -155,8 +157,8 @@ def test_without_balances_the_rest_is_the_same(name, streams):
         # At a rupture a state changes by much in the last digit of the time.
         size = np.nanmax(np.abs(wanted[key].values), initial=0.0)
         np.testing.assert_allclose(found[key].values, wanted[key].values, rtol=1e-7, atol=1e-7 * size, err_msg=key)
-    checked = check(stream)  # by runs that have theirs
-    assert np.all(checked.error < 1e-6), str(checked)
+    checked = check(stream)  # by runs that have theirs; extremes lie between outputs and steps
+    assert np.all(checked.error < (1e-3 if name == "stick-slip" else 1e-5)), str(checked)
     assert "balances   not kept" in str(store_summary(stream, stream.store, checked)[1])
 
 
@@ -506,8 +508,7 @@ def test_a_table_of_series_has_a_row_for_each_output_and_words_for_codes(tmp_pat
 
 def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypatch):
     over = {"initial.phi": [0.0, 1.2], K_0: {"from": 50, "to": 300, "points": 7}}
-    simulation = case(keep=ENDS, over=over, checked="all")
-    stream = simulation.stream(simulation.plan(), tmp_path / "o.zarr")
+    stream = begun(case(keep=ENDS, over=over, checked="all"), tmp_path / "o.zarr")
     assert check(stream) is None
     data = stream.run(1).dataset
     found = check(stream)
@@ -528,24 +529,28 @@ def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypa
 
 def test_the_source_of_errors_is_told_once_however_many_runs_are_checked(tmp_path, monkeypatch):
     monkeypatch.setattr(checking, "RUNS_AT_ONCE", 2)
-    simulation = case(keep=ENDS, over={"initial.T": {"from": 290, "to": 310, "points": 7}}, checked="all")
-    stream = simulation.stream(simulation.plan(), tmp_path / "o.zarr")
+    stream = begun(case(keep=ENDS, over={"initial.T": [290, 295, 300, 305, 310]}, checked="all"), tmp_path / "o.zarr")
     stream.run(1)
     source = check(stream).source
     assert source.count("estimate: a second sweep") == source.count("does not apply to this scene") == 1
 
 
+def test_an_error_of_a_run_contains_that_of_its_extremes(tmp_path):
+    stream = begun(case("stick-slip-debonding", {"max": ["v"]}, {"loading.p.level": [1e5, 1.1e5]}), tmp_path / "o.zarr")
+    exact = surfacechem.run("stick-slip-debonding", ["run.outputs=30001"]).dataset["v"].max()
+    missed = float(1 - stream.run().dataset["v_max"][0] / exact)
+    assert 1e-4 < missed < 1.1 * check(stream).error < 3 * missed
+
+
 def test_a_notebook_shows_where_a_store_is_and_not_all_that_it_is_made_of(tmp_path):
-    simulation = case(keep=ENDS, over={"initial.T": [290, 310]})
-    stream = simulation.stream(simulation.plan(), tmp_path / "o.zarr")
+    stream = begun(case(keep=ENDS, over={"initial.T": [290, 310]}), tmp_path / "o.zarr")
     assert repr(stream) == f"Stream(store={stream.store}, part=(1, 1))"
     assert repr(stream.store) == f"Store(path={tmp_path / 'o.zarr'!r})"
 
 
 def test_what_is_nothing_but_rounding_at_the_end_is_no_error(tmp_path):
     """Heat flows into one body as out of the other, and their mean is the rounding of both."""
-    simulation = case("cooling-to-zero", over={"initial.T": [100, 1000]})
-    stream = simulation.stream(simulation.plan(), tmp_path / "s.zarr")
+    stream = begun(case("cooling-to-zero", over={"initial.T": [100, 1000]}), tmp_path / "s.zarr")
     stream.run()
     assert stream.check().error < 1e-10
 
@@ -558,7 +563,7 @@ def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_smal
     done = SimpleNamespace(
         accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source="", why=""),
         run_ends=[dict.fromkeys(checking.BALANCE_COLUMNS, 0.0)] * 4,
-        runs=[SimpleNamespace(sample=SimpleNamespace(roundings={}))] * 4,
+        runs=[SimpleNamespace(sample=SimpleNamespace(roundings={}), stored=None)] * 4,
         audits=[],
     )
     simulation, plan = (SimpleNamespace(**{name: lambda *_: done}) for name in ("sweep_plan", "picked"))

@@ -143,11 +143,10 @@ def test_a_velocity_reverses_at_breakpoints_of_another_load(breaks, solver):
     np.testing.assert_allclose(reversals(trajectory), [1.0, 2.0, 3.0], rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("solver", ["radau", "lsoda"])
-def test_a_velocity_reverses_at_a_breakpoint_of_its_own(solver):
+def test_a_velocity_reverses_at_a_breakpoint_of_its_own():
     """Before it the table leaves a rounding of the velocity, after it none."""
     loading = {"p": Hold(level=1e5), "v": Table(times=[0.0, 0.7, 1.4, 4.0], values=[1.7e-3, 0.0, -1e-3, 1.6e-3])}
-    np.testing.assert_allclose(reversals(solve(together((), RUBBING, loading), 4.0, solver=solver)), [0.7, 2.4])
+    np.testing.assert_allclose(reversals(solve(together((), RUBBING, loading), 4.0, solver="lsoda")), [0.7, 2.4])
 
 
 def test_a_step_ends_where_a_given_gap_closes():

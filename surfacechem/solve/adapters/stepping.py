@@ -135,8 +135,7 @@ class SteppingSolver(Solver):
                 status = Status.NO_CONSISTENT_STATE
             except StepError:
                 status = Status.STEP_UNDERFLOW if np.all(np.isfinite(run.y)) else Status.NOT_FINITE
-            run.residuals += run.view.residuals
-            run.jacobians += run.view.jacobians
+            run.told.append(Counters(residuals=run.view.residuals, jacobians=run.view.jacobians))
             if status != Status.FINISHED:
                 break
         return run.result(status)
@@ -221,9 +220,10 @@ class _Run:
         """Times, states, rates and ledgers at events, whose margins are in ``fired``."""
         self.steps: list[tuple[Array, Array, Array, Array]] = []
         """Times, states, rates and ledgers at the ends of steps, of several steps at a time."""
-        self.count = self.residuals = self.jacobians = self.factorizations = self.rejected = 0
-        self.stepping = 0.0
-        """Time inside the library's steps [s]."""
+        self.told: list[Counters] = []
+        """Counts of the library, and of its calls."""
+        self.count, self.stepping = 0, 0.0
+        """Steps, and time inside those of the library [s]."""
         self.aim: float | None = None
         """Expected time of an event that the library's step has passed over: the next steps end there."""
 
@@ -251,10 +251,7 @@ class _Run:
             try:
                 self.restarts = self._to_event(method, stop)
             finally:
-                told = method.counters
-                self.factorizations += told.factorizations
-                self.jacobians += told.jacobians
-                self.rejected += told.rejected
+                self.told.append(method.counters)
             if any(self.problem.margins[i].terminal for i in self.restarts):
                 return Status.EVENT
             over = self._over_budget()
@@ -442,7 +439,7 @@ class _Run:
             outputs=outputs[:, :n],
             ledger_outputs=outputs[:, n:],
             events=Events(*points(self.events), index=np.array(self.fired, dtype=np.int64)),
-            counters=Counters(self.count, self.rejected, self.residuals, self.jacobians, self.factorizations),
+            counters=Counters(*map(sum, zip(Counters(self.count), *self.told, strict=True))),
             steps=Points(*points(self.steps)) if problem.record_steps else None,
             stepping=self.stepping,
         )
