@@ -19,6 +19,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -265,37 +266,51 @@ def _is_past_its_end(trajectory: Trajectory, value: float) -> bool:
 
 def _losses(trajectory: Trajectory, least: Mapping[str, float], stored: float) -> tuple[Mapping[str, float], float]:
     """Return the fraction that each law destroys, and the fraction that all destroy together."""
-    destroyed = {law: 0.0 if low >= 0 else _destroyed(trajectory, [law], stored) for law, low in least.items()}
-    together = _destroyed(trajectory, list(least), stored) if any(destroyed.values()) else 0.0
-    return destroyed, together
+    laws = [law for law, low in least.items() if not low >= 0]
+    destroyed = _destroyed(trajectory, [[law] for law in laws], stored)
+    together = _destroyed(trajectory, [list(least)], stored) if any(destroyed) else [0.0]
+    return dict.fromkeys(least, 0.0) | dict(zip(laws, destroyed, strict=True)), together[0]
 
 
-def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
-    """Return the fraction of the entropy turned over by laws that they destroy, by the ledger or at the ends of steps.
+def _destroyed(trajectory: Trajectory, groups: list[list[str]], stored: float) -> list[float]:
+    """Return the fraction of the entropy turned over by each group of laws that the group destroys, by the ledger or at
+    the ends of steps.
 
     Zero if the amount is less than the last digit of the total, which it then does not change.
     """
-    result, accounts, points = trajectory.result, trajectory.model.system.ledger, _steps(trajectory)
-    ledger = points.ledger.copy()
+    if not groups:
+        return []
+    points, system = _steps(trajectory), trajectory.model.system
+    booked, seen, digits = np.array([_turned_over(trajectory, points, laws) for laws in groups]).swapaxes(0, 1)
+    amounts, wholes = losses_of(booked, seen)
+    left = np.flatnonzero(~(amounts <= ERROR_MARGIN * trajectory.run.rtol * wholes))
+    destroyed, booked, seen = np.zeros(len(groups)), booked[left], seen[left]
+    if not len(left):
+        return destroyed.tolist()
+    outputs = [[system.output_columns[f"sigma_{law}"] for law in groups[g]] for g in left]
+    chosen = np.flatnonzero(((booked < 0) | (seen < 0)).any(axis=0))
+    for rounded in _rounding_of(trajectory, points, trajectory.model.output_function, outputs, chosen):
+        amounts, wholes = losses_of(booked, seen, rounded * np.diff(points.t) + digits[left])
+        destroyed[left] = np.divide(amounts, wholes, out=np.zeros(len(left)), where=wholes != 0)
+        destroyed[left[amounts <= EPS * stored]] = 0.0
+        if not destroyed.any():
+            break
+    return destroyed.tolist()
+
+
+def _turned_over(trajectory: Trajectory, points: Points, laws: list[str]) -> tuple[Array, Array, Array]:
+    """Return the entropy that laws produce in each step, by the ledger and by its end, and the ledger's last digits."""
+    result, ledger, accounts = trajectory.result, points.ledger.copy(), trajectory.model.system.ledger
     made = [trajectory.within_bounds.everywhere(f"sigma_{law}")[-len(points.t) :] for law in laws]
     rates = np.array(made).sum(axis=0)
     if len(rates) > 1 and _is_past_its_end(trajectory, rates[-1] + ledger[-1].sum()):
         rates[-1], ledger[-1] = 0.0, ledger[-2]
     columns = [j for j, a in enumerate(accounts) if a.kind == "entropy production" and a.law in laws]
-    booked, lengths = np.diff(ledger[:, columns].sum(axis=1)), np.diff(points.t)
     # The production at the end of a step stands for the step, except for the first of an arc: it may jump between arcs.
-    seen = rates[1:] * np.where(np.diff(result.segments_at(points.t, points.segment)) > 0, 0.0, lengths)
-    amount, whole = losses_of(booked, seen)
-    if amount <= ERROR_MARGIN * trajectory.run.rtol * whole:
-        return 0.0
+    first = np.diff(result.segments_at(points.t, points.segment)) > 0
     digits = EPS * np.abs(ledger).sum(axis=1)
-    outputs = [trajectory.model.system.output_columns[f"sigma_{law}"] for law in laws]
-    chosen = np.flatnonzero((booked < 0) | (seen < 0))
-    for rounded in _rounding_of(trajectory, points, trajectory.model.output_function, outputs, chosen):
-        amount, whole = losses_of(booked, seen, rounded * lengths + digits[1:] + digits[:-1])
-        if amount <= EPS * stored or not whole:
-            return 0.0
-    return float(amount / whole)
+    seen = rates[1:] * np.where(first, 0.0, np.diff(points.t))
+    return np.diff(ledger[:, columns].sum(axis=1)), seen, digits[1:] + digits[:-1]
 
 
 def _steps(trajectory: Trajectory) -> Points:
@@ -311,15 +326,15 @@ def _exchanged_by_errors(trajectory: Trajectory) -> float:
     ledger, points, (energies, *_) = trajectory.model.program.ledger, _steps(trajectory), trajectory.model.system.totals
     if ledger is None or len(points.t) < 2:
         return 0.0
-    powers = next(_rounding_of(trajectory, points, ledger, energies.accounts, np.arange(len(points.t) - 1)))
-    return float(powers @ np.diff(points.t))
+    powers = next(_rounding_of(trajectory, points, ledger, [energies.accounts], np.arange(len(points.t) - 1)))
+    return float(powers[0] @ np.diff(points.t))
 
 
 def _rounding_of(
-    trajectory: Trajectory, points: Points, function: Function, columns: list[int], chosen: NDArray[np.int64]
+    trajectory: Trajectory, points: Points, function: Function, groups: list[list[int]], chosen: NDArray[np.int64]
 ) -> Iterator[Array]:
-    """Yield the rounding of the sum of some columns of a function, the production of laws for instance, in chosen
-    steps, shape (steps,).
+    """Yield the rounding of the sum of each group of columns of a function, the production of laws for instance, in
+    chosen steps, shape (groups, steps).
 
     It is the change at the ends of a step by the last digits of all arguments, and by errors of the states within the
     tolerance. First by arguments of cheap evaluations, then one by one by those for which surroundings have to be
@@ -334,13 +349,15 @@ def _rounding_of(
     least[1 : 1 + n] = ERROR_MARGIN * result.problem.atol
     external, filled = model.program.external, model.program.filled(rows.copy())
     read = external.reads(rows) if external else np.empty(0)
+    columns = list(chain.from_iterable(groups))
     now = function(filled)[:, columns]
     found = EPS * np.abs(now)
 
     def rounding() -> Array:
-        rates = np.zeros(len(points.t))
-        rates[ends] = found.sum(axis=1)
-        return np.maximum(rates[1:], rates[:-1])
+        rates = np.zeros((len(groups), len(points.t)))
+        parts = np.split(found, np.cumsum([len(group) for group in groups[:-1]]), axis=1)
+        rates[:, ends] = [part.sum(axis=1) for part in parts]
+        return np.maximum(rates[:, 1:], rates[:, :-1])
 
     asking = []
     for j in range(rows.shape[1]):
