@@ -339,12 +339,12 @@ def quantity_words(values: xarray.DataArray) -> str:
     return words[:1].upper() + words[1:]
 
 
-def is_mode(values: xarray.DataArray) -> bool:
+def is_mode(values: xarray.DataArray | xarray.Variable) -> bool:
     """True for a mode of the automaton, according to the long name of a variable."""
     return str(values.attrs.get("long_name", "")).startswith("mode (")
 
 
-def drawn_as(values: xarray.DataArray) -> Any:
+def drawn_as(values: xarray.DataArray | xarray.Variable) -> Any:
     """Return the draw style of a variable between outputs: a step for a mode."""
     return "steps-post" if is_mode(values) else "default"
 
@@ -353,7 +353,7 @@ def draw_curve(ax: Axes, dataset: xarray.Dataset, over: str, values: Array, **lo
     """Draw values over a variable, dotted where they jump between two outputs at the same time, or with the jump of
     an event between them: a jump has no values in between.
     """
-    x, times = dataset[over].values, dataset[dataset[over].dims[0]].values
+    x, times = dataset.variables[over].values, dataset[dataset.variables[over].dims[0]].values
     leaps = np.abs(np.diff(times)) <= FLAT * np.abs(times[1:])
     if "event_verdict" in dataset and dataset["event_verdict"].dims == ("event",):
         moments = dataset["event_time"].values[dataset["event_verdict"].values != ""]
@@ -367,7 +367,7 @@ def draw_curve(ax: Axes, dataset: xarray.Dataset, over: str, values: Array, **lo
         ax.plot(x, sides, ":", color=line.get_color(), linewidth=0.9, zorder=line.get_zorder() - 0.1)
 
 
-def unit(values: xarray.DataArray) -> str:
+def unit(values: xarray.DataArray | xarray.Variable) -> str:
     """Return the unit of a variable in the notation of the CF conventions."""
     return str(values.attrs.get("units", "1"))
 

@@ -200,20 +200,24 @@ def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | Non
     moments = np.array([t for t, _ in _event_times(dataset)])
     late = int(np.sum(moments > times[-1] / 10))
     crowded = late >= MOST_IN_LAST_DECADE and 2 * late > len(moments) and not wants_log_axis(times)
-    if crowded or not wants_log_axis(times, [dataset[name].values for name in names]):
+    if crowded or not wants_log_axis(times, [dataset.variables[name].values for name in names]):
         return None
     return float(max(times[times > 0][0], LOG_AXIS_PART * times[-1]))
 
 
 def curves(dataset: xarray.Dataset, over: str = "time") -> list[str]:
     """Return the names of numbers that are functions of time, or of another dimension, only."""
-    return [str(n) for n, values in dataset.data_vars.items() if values.dims == (over,) and values.dtype.kind == "f"]
+    # Variables themselves: arrays with coordinates take a time that grows with the number of variables, each.
+    found = ((str(name), dataset.variables[name]) for name in dataset.data_vars)
+    return [name for name, values in found if values.dims == (over,) and values.dtype.kind == "f"]
 
 
 def of_kind(dataset: xarray.Dataset, names: Sequence[str], units: str, pattern: str) -> list[str]:
     """Return the names that a panel of the default figure shows; modes are shown as bands, exact values dashed."""
-    fitting = [name for name in names if re.fullmatch(units, unit(dataset[name])) and re.fullmatch(pattern, name)]
-    return [name for name in fitting if not (name.endswith("_exact") or style.is_mode(dataset[name]))]
+    fitting = [
+        name for name in names if re.fullmatch(units, unit(dataset.variables[name])) and re.fullmatch(pattern, name)
+    ]
+    return [name for name in fitting if not (name.endswith("_exact") or style.is_mode(dataset.variables[name]))]
 
 
 def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> list[Panel]:
@@ -224,8 +228,8 @@ def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: st
     shown, found = [name for name in dict.fromkeys(variables or known) if name != against], []
     if not variables:
         return _by_kind(dataset, shown)
-    for wanted in dict.fromkeys(unit(dataset[name]) for name in shown):
-        group = [name for name in shown if unit(dataset[name]) == wanted]
+    for wanted in dict.fromkeys(unit(dataset.variables[name]) for name in shown):
+        group = [name for name in shown if unit(dataset.variables[name]) == wanted]
         title = meaning(dataset[group[0]]) if len(group) == 1 else ""
         found.append(Panel(title if len(title) < MOST_TITLE_LETTERS else "", wanted, group))
     return found
@@ -241,11 +245,13 @@ def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
             title = "Coverage"
         # A quantity below the last digit of another one of its unit is rounding.
         sizes = {
-            name: style.largest(dataset[name].values) for name in known if re.fullmatch(units, unit(dataset[name]))
+            name: style.largest(dataset.variables[name].values)
+            for name in known
+            if re.fullmatch(units, unit(dataset.variables[name]))
         }
         felt = EPS * max(sizes.values(), default=0.0)
-        if any(varies(dataset[name].values) and sizes[name] > felt for name in names):
-            panels.append(Panel(title, unit(dataset[names[0]]), names))
+        if any(varies(dataset.variables[name].values) and sizes[name] > felt for name in names):
+            panels.append(Panel(title, unit(dataset.variables[names[0]]), names))
     return panels
 
 
@@ -285,7 +291,7 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
 
 def _finite_values(dataset: xarray.Dataset, panel: Panel, rows: Any = slice(None)) -> Array:
     """Return the finite values that a panel shows, at some of its points."""
-    values = np.concatenate([dataset[name].values[rows] for name in panel.names])
+    values = np.concatenate([dataset.variables[name].values[rows] for name in panel.names])
     return np.asarray(values[np.isfinite(values)])
 
 
@@ -312,33 +318,35 @@ def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> 
     rest: list[list[str]] = []
     if len(groups) > len(style.COLOURS):
         # Curves of traces cannot be distinguished next to large ones and need no colours.
-        groups.sort(key=lambda names: -style.largest(dataset[names[0]].values))
+        groups.sort(key=lambda names: -style.largest(dataset.variables[names[0]].values))
         groups, rest = groups[:MOST_COLOURED], groups[MOST_COLOURED:]
     for names in groups:
         label = " = ".join([*map(symbol, names[:MOST_NAMES]), *(["..."] if len(names) > MOST_NAMES else [])])
-        drawstyle = style.drawn_as(dataset[names[0]])
-        style.draw_curve(ax, dataset, over, dataset[names[0]].values, label=label, marker=marker, drawstyle=drawstyle)
+        drawstyle = style.drawn_as(dataset.variables[names[0]])
+        style.draw_curve(
+            ax, dataset, over, dataset.variables[names[0]].values, label=label, marker=marker, drawstyle=drawstyle
+        )
     for k, names in enumerate(rest):
         label = "_" if k else f"{len(rest)} smaller"
         kw = {"label": label, "marker": marker, "color": "0.75", "linewidth": 0.8, "zorder": 1}
-        style.draw_curve(ax, dataset, over, dataset[names[0]].values, **kw)
+        style.draw_curve(ax, dataset, over, dataset.variables[names[0]].values, **kw)
     exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in dataset]
     for k, name in enumerate(exact):
         kw = {"label": "_" if k else "exact", "linestyle": DASHES, "color": "black", "linewidth": 0.9}
-        style.draw_curve(ax, dataset, over, dataset[name].values, **kw)
+        style.draw_curve(ax, dataset, over, dataset.variables[name].values, **kw)
 
 
 def group_coinciding(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:
     """Group names whose curves coincide, so that none hides another."""
-    groups: list[list[str]] = []
+    groups: list[tuple[Array, list[str]]] = []
     for name in names:
-        values = dataset[name].values
-        twin = next((g for g in groups if np.allclose(dataset[g[0]].values, values, rtol=style.FLAT, atol=0.0)), None)
+        values = dataset.variables[name].values
+        twin = next((g for first, g in groups if np.allclose(first, values, rtol=style.FLAT, atol=0.0)), None)
         if twin is None:
-            groups.append([name])
+            groups.append((values, [name]))
         else:
             twin.append(name)
-    return groups
+    return [group for _, group in groups]
 
 
 def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
@@ -397,7 +405,7 @@ def _event_times(dataset: xarray.Dataset) -> list[tuple[float, str]]:
     named = {name: ("event",) for name in ("event_name", "event_reason") if name in dataset}
     style.check_variables(dataset, {"event_time": ("event",)}, named)
     texts = [dataset[name].values.astype(str).tolist() for name in named] or [[""] * dataset.sizes["event"]]
-    quantities = [name for name in curves(dataset) if not style.is_mode(dataset[name])]
+    quantities = [name for name in curves(dataset) if not style.is_mode(dataset.variables[name])]
     events = zip(dataset["event_time"].values.tolist(), texts[0], texts[-1], strict=True)
     return [(t, why if name.partition(" ")[0] in quantities else name) for t, name, why in events]
 
@@ -471,7 +479,7 @@ def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[flo
     """Draw bands: every other stage of a programme, with middles and names of all as the result; else the times in
     which a mode differs from its initial value.
     """
-    modes = [name for name in curves(dataset) if style.is_mode(dataset[name])]
+    modes = [name for name in curves(dataset) if style.is_mode(dataset.variables[name])]
     staged, named = "stage" in modes, []
     for name in ["stage"] if staged else modes:
         spans = _mode_spans(dataset, name)
