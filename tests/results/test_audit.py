@@ -142,3 +142,34 @@ def test_work_that_is_booked_wrong_is_told(mean, part):
     wrong = result.ledger_outputs + part * np.linspace(0, 0.1, len(result.times))[:, None]
     findings = audit.audit(replace(trajectory, result=result._replace(ledger_outputs=wrong))).findings
     assert any("the balance of energy is open" in finding for finding in findings)
+
+
+RING = """
+phases:
+- {name: ring, thermo: ideal-surface, kinetics: surface, species: [A, B, C], site-density: 1e-8 kmol/m^2}
+species:
+- {name: A, composition: {H: 1}, thermo: {model: constant-cp}}
+- {name: B, composition: {H: 1}, thermo: {model: constant-cp}}
+- {name: C, composition: {H: 1}, thermo: {model: constant-cp}}
+reactions:
+- {equation: A => B, rate-constant: {A: 30, b: 0, Ea: 0}}
+- {equation: B => C, rate-constant: {A: 20, b: 0, Ea: 0}}
+- {equation: C => A, rate-constant: {A: 10, b: 0, Ea: 0}}
+"""
+ON_RING = """
+bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+interface: {temperature: 300 K, mechanism: {file: ring.yaml}}
+initial: {coverages: {A: 1}}
+run: {until: 1 s}
+"""
+
+
+def test_many_laws_are_judged_in_the_time_of_one(tmp_path, monkeypatch):
+    """A judgement of each by itself took a minute for the hundreds of reactions of a mechanism."""
+    searches = []
+    monkeypatch.setattr(audit, "_rounding_of", lambda *a, search=audit._rounding_of: searches.append(a) or search(*a))
+    (tmp_path / "ring.yaml").write_text(RING)
+    (tmp_path / "case.yaml").write_text(ON_RING)
+    balances = surfacechem.load(tmp_path / "case.yaml").run().audit
+    assert sum(part > 0 for part in balances.destroyed.values()) >= 2
+    assert sum(function is not None and len(groups) > 1 for *_, function, groups, _ in searches) == 1
