@@ -110,8 +110,9 @@ def run_details(solution: Solution) -> dict[str, Rows]:
     }
 
 
-def _solved(system: System, run: Run) -> str:
-    return f"{states(system)}; {system.regime}; {run.solver} at rtol {run.rtol:g}"
+def _solved(system: System, run: Run, steps: str = "") -> str:
+    """Describe a system and how it was solved; ``steps`` in words if another method than the solver's took them."""
+    return f"{states(system)}; {system.regime}; {steps.removeprefix('by ') or run.solver} at rtol {run.rtol:g}"
 
 
 def _accuracy(accuracy: Accuracy) -> str:
@@ -375,7 +376,7 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
     destroyed = f"; ENTROPY DESTROYED in {counted(destroys, 'run')}" if destroys else ""
     facts = [
         ("swept", swept_in_words(chunks.plan, names)),
-        ("solved", _solved(chunks.model.system, chunks.run)),
+        ("solved", _solved(chunks.model.system, chunks.run, getattr(chunks.lanes, "words", ""))),
         ("ended", f"{ends.sum()} of {counted(chunks.plan.size, 'run')}: {words}"),
         *([("error", error)] if error else []),
         ("balances", f"{_worst(stream, done)}{destroyed}"),
