@@ -76,9 +76,11 @@ def precision(dataset: xarray.Dataset) -> Figure:
                 limit = float(case[name.replace("error_", "uncertainty_")]) if name.startswith("error_") else np.nan
                 for k in range(solvers):
                     _draw_solver(ax, case.isel(solver=k), name, limit, *markers[k])
+                finite = case[name].values[np.isfinite(case[name].values)]
+                if positive := finite[finite > 0].tolist():  # Matplotlib's margins of a single value may have no width
+                    ax.set_xlim(max(min(positive), LEAST_ERROR) / 3, 3 * max(*positive, LEAST_ERROR))
                 if np.isfinite(limit):
                     ax.axvspan(LEAST_ERROR, max(limit, LEAST_ERROR), color="0.5", alpha=0.12, linewidth=0)
-                    finite = case[name].values[np.isfinite(case[name].values)]
                     ax.set_xlim(left=max(min([limit, *finite]) / 3, LEAST_ERROR / 2))
                 ax.set_xlabel(ERRORS[name] if i == rows - 1 else "")
             grid[i, 0].set_ylabel("run time [s]")

@@ -234,15 +234,16 @@ def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str,
 
     try:
         with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
-            for column in columns:
+            for column in columns:  # all are defined before any is written: between these the library looks at all
                 for dimension, size in zip(column.dimensions, np.shape(column.values), strict=True):
                     if dimension not in file.dimensions:
                         file.createDimension(dimension, size)
                 kind = str if np.asarray(column.values).dtype == object else np.float64
                 variable = file.createVariable(column.name, kind, column.dimensions, fill_value=False)
                 variable.setncatts(column.attributes)
-                variable[...] = column.values
             file.setncatts(attributes)
+            for column in columns:
+                file[column.name][...] = column.values
     except RuntimeError as error:  # the library raises it for all errors of HDF5
         raise OSError(str(error)) from error
 
