@@ -73,7 +73,7 @@ def test_printed_equations_agree_with_machine_code_and_are_short_enough_to_read(
         for name, (function, expressions) in functions.items():
             exact = function(inputs)
             if name == "margins":  # what is not in play is printed as open
-                exact = np.where(system.active_guards(parameters), exact, 1.0)
+                exact = np.where(system.active_guards(np.array(parameters)), exact, 1.0)
             error = np.abs(np.array(getattr(module, name)(t, y, ydot, parameters)) - exact)
             for i in np.flatnonzero(~(error <= FORMULA_EPS * np.abs(exact))):
                 assert error[i] <= FORMULA_EPS * float(magnitude(expressions[i]).subs(point).n(53, real=True)), name
