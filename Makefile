@@ -7,7 +7,6 @@ BIN := $(abspath $(VENV))/bin
 export PYTHONDONTWRITEBYTECODE :=
 PACKAGE := $(VENV)/.installed
 RUNTIME := $(VENV)/.compiled
-LANES := $(VENV)/.compiled-lanes
 IMPORTED := $(VENV)/.imported
 TOOLS := $(VENV)/.installed-tools
 DOCTOOLS := $(VENV)/.installed-doctools
@@ -30,16 +29,16 @@ lint: $(TOOLS)  ## style, types and which room imports which
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-unit: $(LANES) $(TOOLS)  ## the tests, without the slow ones
+unit: $(RUNTIME) $(TOOLS)  ## the tests, without the slow ones
 	$(PYTEST)
 
-core: $(LANES) $(TOOLS)  ## of these the tests of assembly, laws, mechanisms, stepper and exact solutions
+core: $(RUNTIME) $(TOOLS)  ## of these the tests of assembly, laws, mechanisms, stepper and exact solutions
 	$(PYTEST) -m "not slow and not around"
 
-slow: $(LANES) $(TOOLS)  ## the slow tests
+slow: $(RUNTIME) $(TOOLS)  ## the slow tests
 	$(PYTEST) -m slow
 
-docs: $(LANES) $(DOCTOOLS)  ## the documentation, notebooks executed, warnings are errors
+docs: $(RUNTIME) $(DOCTOOLS)  ## the documentation, notebooks executed, warnings are errors
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # A case that physics stops, by design, ends with status 3.
@@ -85,11 +84,6 @@ $(PACKAGE): pyproject.toml | $(VENV)/bin/python
 $(RUNTIME): $(PACKAGE)
 	$(BIN)/python -m surfacechem.solve
 	$(BIN)/surfacechem run exothermic -q -o $(VENV)/exothermic.nc
-	touch $@
-
-# What tests and notebooks would otherwise compile at the same time, each for itself.
-$(LANES): $(RUNTIME)
-	$(BIN)/python -c "from surfacechem.solve.lanes import lane_batch as b; [m.loop.load() for m in (b.EXPLICIT, b.ROSENBROCK, b.RADAU)]"
 	touch $@
 
 # Every module is imported with nothing but what the package declares to need.
