@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import wraps
@@ -114,6 +114,19 @@ def shortened(text: str) -> str:
     text = LONG_PART.sub(lambda part: f"{part[0][:40]} [...] {part[0][-20:]}", text)
     half = LONGEST // 2
     return text if len(text) <= LONGEST else f"{text[:half]} [...] {text[-half:]}"
+
+
+MOST_LISTED = 6
+"""Number of names that a message lists: a mechanism may have hundreds."""
+
+
+def listed(names: Sequence[str], most: int = MOST_LISTED) -> str:
+    """Return names with commas; of many the first ones, and how many more there are.
+
+    >>> listed(["R1", "R2", "R3"]), listed(["R1", "R2", "R3"], 2)
+    ('R1, R2, R3', 'R1, R2 and 1 more')
+    """
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def suggestion(name: str, known: Iterable[str], listed_by: str = "") -> str:

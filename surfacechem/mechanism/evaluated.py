@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, RateLaw, option, parameter
 from surfacechem.contracts.units import ELECTRON_VOLT
-from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
+from surfacechem.errors import InputError, Place, listed, refuse_unknown, suggestion
 from surfacechem.expressions import Expression, absolute
 from surfacechem.mechanism.rates import MechanismReaction
 from surfacechem.mechanism.thermo import Formula, Species, identifiers, word
@@ -236,10 +236,9 @@ def missing_species(surface: Any) -> tuple[str, ...]:
         for item in zip(phase.species_names, phase.X, indices(surface, phase), strict=True)
     )
     found = [name for name, part, index in there if part <= TRACE and made[index] > 0]
-    names = ", ".join(found[:6]) + (f" and {len(found) - 6} more" if len(found) > 6 else "")
     text = (
-        f"the neighbours hold no {names}, which reactions make: what they release is diluted without end, and its "
-        "entropy is counted as at a mole fraction of 1e-300."
+        f"the neighbours hold no {listed(found)}, which reactions make: what they release is diluted without end, and "
+        "its entropy is counted as at a mole fraction of 1e-300."
     )
     return (text,) if found else ()
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
 from surfacechem.contracts.terms import Load
+from surfacechem.errors import listed
 from surfacechem.plots import style
 from surfacechem.plots.style import symbol
 from surfacechem.scene import Body, Mounting, Scene
@@ -172,6 +173,5 @@ def _given(scene: Scene) -> list[str]:
 
 def _wrapped(word: str, names: Sequence[str]) -> list[str]:
     """Return a word and up to four names in lines, since a mechanism may have many reactions."""
-    unique = list(dict.fromkeys(names))
-    text = f"{word}: {', '.join(unique[:4])}" + (f" and {len(unique) - 4} more" if len(unique) > 4 else "")
+    text = f"{word}: {listed(list(dict.fromkeys(names)), 4)}"
     return [text] if "$" in text else wrap(text, MOST_LETTERS, subsequent_indent="    ")

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function
+from surfacechem.errors import MOST_LISTED, listed
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.model.system import Range, RatePair, System, Total
 from surfacechem.results.accuracy import Accuracy
@@ -136,7 +137,10 @@ class Audit:
     @cached_property
     def findings(self) -> tuple[str, ...]:
         """Defects of the balances in words, usually none."""
-        found = [f"the law {law.replace('_', ' ')} destroys entropy" for law in self.violations]
+        laws = [law.replace("_", " ") for law in self.violations]
+        found = [f"the law {law} destroys entropy" for law in laws]
+        if len(laws) > MOST_LISTED:
+            found = [f"the laws {listed(laws)} destroy entropy"]
         if self.destroys and not found:
             found = ["the laws together destroy entropy"]
         # The exchanged amount may be less than the rounding of a body's heat content.

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surfacechem.contracts.terms import Load, Varying
+from surfacechem.errors import listed
 from surfacechem.quantities import VARIABLES
 from surfacechem.results.event_table import entropy_destroyed, event_counts, event_summary
 from surfacechem.runs.listing import Rows, Sheet, counted
@@ -65,11 +66,15 @@ def duration(seconds: float) -> str:
     return f"{seconds:.1g} s"
 
 
+MOST_STATES = 12
+"""Number of states that a summary names: those of a mechanism may be hundreds."""
+
+
 def states(system: System) -> str:
-    """List the states by name; algebraic ones are marked."""
+    """List the states by name, of many the first ones; algebraic ones are marked."""
     names = [f"{name} (algebraic)" if state.algebraic else name for name, state in system.own_states.items()]
     names += [f"{profile.name} ({len(profile.points) - 1} cells)" for profile in system.profiles]
-    return ", ".join(names) or "nothing: everything is prescribed"
+    return listed(names, MOST_STATES) or "nothing: everything is prescribed"
 
 
 def run_summary(solution: Solution, written: Path | None, details: bool = False) -> Sheet:
@@ -131,8 +136,9 @@ def _balances(audit: Audit, unit: str) -> str:
     if not audit.least:
         return f"{residuals}; nothing dissipates"
     if audit.violations:
-        worst = ", ".join(f"{law} ({audit.least[law]:.3g} {unit})" for law in audit.violations)
-        return f"{residuals}; ENTROPY DESTROYED by {worst}"
+        worst = sorted(audit.violations, key=audit.least.__getitem__)
+        told = [f"{law} ({audit.least[law]:.3g} {unit})" for law in worst]
+        return f"{residuals}; ENTROPY DESTROYED by {listed(told)}"
     if audit.destroys:
         return f"{residuals}; ENTROPY DESTROYED by all laws together"
     least = min(audit.least.values())
