@@ -227,16 +227,22 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
 def error_of(dataset: xarray.Dataset, names: Sequence[str] = ()) -> float | None:
     """Return the largest relative error of variables that have one of their own, else that of the dataset, of a store
     that of its checked runs; None if none is told.
+
+    Where a store keeps extremes its error is theirs, far more than that of other variables.
     """
     own = [float(dataset[n].attrs["error"]) for n in names if n in dataset and "error" in dataset[n].attrs]
-    if not own and "checked_error" in dataset:
+    extremes = {str(name) for name in dataset if str(name).endswith(("_max", "_min"))}
+    if not own and "checked_error" in dataset and not (names and extremes and extremes.isdisjoint(names)):
         own = [*dataset["checked_error"].values, *dataset["hardest_error"].values]
     return float(np.fmax.reduce(own)) if own else attribute(dataset, "error")
 
 
 def limit_zoom(set_ends: Callable[[float, float], Any], values: Array, error: float | None) -> None:
-    """Set the ends of an axis such that it does not magnify rounding, or what is within the relative error."""
-    finite, half = values[np.isfinite(values)], (error or 0.0) * largest(values)
+    """Set the ends of an axis such that it does not magnify rounding, or what is within the relative error; one that is
+    not below 1 says nothing of what is seen.
+    """
+    known = error if error is not None and error < 1.0 else 0.0
+    finite, half = values[np.isfinite(values)], known * largest(values)
     if not len(finite):
         return
     middle = float(finite.min() + finite.max()) / 2

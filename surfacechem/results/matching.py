@@ -88,7 +88,7 @@ def exact_values(
     # All times in one call, as the cost of an exact solution is per call.
     every = solution(np.concatenate([times, before_end, around.ravel()]))
     first = len(times) + len(before_end)
-    exact = {each: values[: len(times)] for each, values in every.items()}
+    exact = {each: values[: len(times)].copy() for each, values in every.items()}
     _choose_sides(
         exact,
         {each: values[len(times) : first] for each, values in every.items()},

@@ -295,8 +295,9 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
 def _of_statistics(found: Rupture, exact: references.Reference | Rupture) -> float:
     """Return the largest error of the load at rupture, or that of the lifetime; absolute if the exact value is zero."""
     pairs = [(getattr(found, each.name), getattr(exact, each.name)) for each in fields(found)]
-    errors = [float(abs(ours - true) / abs(true) if true else abs(ours)) for ours, true in pairs]
-    return max(float(np.fmax.reduce(errors)), EPS)
+    known = [pair for pair in pairs if not np.isnan(pair[0])]  # what a run has not reached has no error
+    errors = [float(abs(ours - true) / abs(true) if true else abs(ours)) for ours, true in known]
+    return float(np.max([EPS, *errors])) if errors else np.nan
 
 
 # -- the dataset ------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ import xarray
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.plots import figure, save
+from surfacechem.plots import figure, save, style
 from surfacechem.plots.time_series import group_coinciding, wants_log_axis
 
 pytestmark = pytest.mark.around
@@ -302,3 +302,12 @@ def test_a_jump_between_outputs_is_dotted_from_the_one_to_the_next():
     nothing = np.nan
     assert solid.get_ydata() == pytest.approx([1, nothing, 2, 3, 4, nothing, 1, 2, nothing, 5, 4], nan_ok=True)
     assert dotted.get_ydata() == pytest.approx([1, 2, nothing, 4, 1, 2, 5, nothing], nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("error", "ends"), [(1e-2, [(297.0, 303.0)]), (np.inf, []), (np.nan, []), (3.0, []), (None, [])]
+)
+def test_an_axis_does_not_magnify_a_known_error_alone(error, ends):
+    found = []
+    style.limit_zoom(lambda *limits: found.append(limits), np.array([299.9, 300.1]), error)
+    np.testing.assert_allclose(np.array(found), ends, atol=0.01)

@@ -226,6 +226,9 @@ def test_a_figure_of_a_store_tells_the_error_of_its_checked_runs(tmp_path):
         for change, span in ((0.1 * checked.error, 600 * checked.error), (1e-15, 30.0)):
             close = data.assign(T_last=data["T_last"].copy(data=[300.0, 300.0 * (1 + change)]))
             assert np.ptp(plots.figure(close, ["T_last"]).axes[0].get_ylim()) == pytest.approx(span)
+        close = data.assign(T_last=data["T_last"].copy(data=[300.0, 300.1]), v_max=data["T_last"])
+        close["checked_error"] += 1e-2
+        assert np.ptp(plots.figure(close, ["T_last"]).axes[0].get_ylim()) < 0.2
 
 
 def test_ends_are_those_of_the_runs_also_where_they_stop_between_outputs(tmp_path):

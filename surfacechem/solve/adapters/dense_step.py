@@ -122,7 +122,8 @@ class Guards:
     def at_zero(self, active: NDArray[np.bool_]) -> list[int]:
         """Return the kinks that have come to zero within roundoff, in a direction that counts."""
         counts = active & ~self.limits & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
-        return np.flatnonzero(counts & (np.abs(self.now) <= FORMULA_EPS * self.largest)).tolist()
+        near = np.isfinite(self.largest) & (np.abs(self.now) <= FORMULA_EPS * self.largest)
+        return np.flatnonzero(counts & near).tolist()
 
     def fallen(self, now: Array) -> NDArray[np.bool_]:
         """Return a mask of the due guards that have fallen to these values."""
