@@ -35,7 +35,7 @@ from surfacechem.surfaces.inner_sums import (
     piece_edges,
 )
 from surfacechem.surfaces.nearest_places import NearPlaces, near_places
-from surfacechem.surfaces.projection import FIRST_ORDER, POLE, Array, Projection, Surface
+from surfacechem.surfaces.projection import FIRST_ORDER, POLE, Array, Surface
 from surfacechem.surfaces.shapes import Disc, Plane
 from surfacechem.tolerances import NEGLIGIBLE
 
@@ -72,32 +72,64 @@ Integrand = Callable[[Array, int], tuple[Array, int]]
 """Function from points (n, 3), and the level of the rules inside, to values (n, ...) per area and a number of pairs."""
 
 
+SAMPLES = np.array([0, 1 / 128, 1 / 4, 1 / 2, 3 / 4, 127 / 128, 1])
+"""Points along each side of a patch at which it is tested for a level. The pairs at the ends give the slope there: a
+minimum or maximum between other points shows as a change of its sign.
+"""
+
+SLIGHT_CUT, CUT_HALVINGS = 0.1, 8
+"""A patch divided so unevenly that part times rest is below this is halved first. The second is the number of halvings
+in excess of those that reduce its area to the accuracy.
+"""
+
+MOST_CROSSED = 256
+"""Patches crossed by an edge in addition to their level are halved too, if there are at most this many: lines then
+cross rather than run along each other.
+"""
+
+SIDE_PARTS, ROOT_SAMPLES = 3, 10
+"""Parts of a side with separate lines of nodes, and gaps evaluated to locate a level on a line."""
+
+
 @dataclass(frozen=True)
 class Patches:
     """Patches of a surface between substituted parameters ``low`` and ``high``, around ``at`` with ``scale``.
 
     All four have shape (n, 2). Directions in which nothing varies (``uniform``) have two nodes.
+
+    Patches that an ``other`` surface divides have levels: of the gap to it, or of the distance beyond one of its edges.
+    ``level`` (n,) is the index of each patch's level, and ``along`` (n,) the direction in which it is located, -1 if it
+    has none. Heights above a level smaller than ``noise`` [m] count as zero.
     """
 
     surface: Surface
+    uniform: tuple[bool, bool]
     at: Array
     scale: Array
     low: Array
     high: Array
-    uniform: tuple[bool, bool]
+    level: Levels
+    along: Levels
+    share: Array
+    """Fraction of each patch below the level times the fraction above."""
+    crossed: NDArray[np.bool_]
+    """True for patches that an edge divides in another way."""
+    leaves: Array
+    """Coordinates across that direction where the level leaves each patch at its ends (n, 2); NaN if unknown."""
+    other: Surface | None = None
+    levels: tuple[float, ...] = ()
+    noise: float = 0.0
 
-    arrays: ClassVar[Sequence[str]] = ("at", "scale", "low", "high")
+    arrays: ClassVar[Sequence[str]] = ("at", "scale", "low", "high", "level", "along", "share", "crossed", "leaves")
     """Names of the arrays with an entry for each patch."""
 
     @property
-    def rule_kinds(self) -> Levels:
-        """Kind of each patch (n,): patches of one kind have rules with equally many points."""
-        return np.zeros(len(self), dtype=int)
-
-    @property
     def first_level(self) -> int:
-        """Level of the first rule: with few patches two rules may agree while both are wrong."""
-        return FIRST_LEVEL if any(self.uniform) else 1
+        """Level of the first rule: with few patches two rules may agree while both are wrong, and a cut may be curved
+        between the lines on which it is located.
+        """
+        curved = self.other is not None and self.other.search == 1
+        return FIRST_LEVEL if curved or any(self.uniform) else 1
 
     def __getitem__(self, chosen: NDArray[Any] | slice) -> Self:
         """Return some of the patches."""
@@ -108,23 +140,26 @@ class Patches:
         return len(self.at)
 
     def nodes(self, order: int) -> tuple[Array, Array]:
-        """Return points (n, k, 3) of a rule, and their areas (n, k); all patches are of one kind."""
-        (u, du), (v, dv) = (self.parameters(k, *self.rule(k, order)) for k in range(2))
-        u, v = np.broadcast_arrays(u[:, :, None], v[:, None, :])
-        return self.points(np.stack([u, v], axis=-1), du[:, :, None] * dv[:, None, :])
+        """Return points (n, k, 3) of a rule on both sides of the level, and their areas (n, k).
 
-    def point_count(self, order: int) -> int:
-        """Return the largest number of points of a rule on each patch; all patches are of one kind."""
-        return order**2
-
-    def cost(self, order: int) -> int:
-        """Return the cost of finding the points of a rule, in pairs of points."""
-        return 0 * order
-
-    def points(self, at: Array, lengths: Array) -> tuple[Array, Array]:
-        """Return points (n, k, 3) at parameters (n, ..., 2), and their areas (n, k) from products of lengths."""
-        x, areas = self.surface.elements(at.reshape(len(at), -1, 2))
-        return x, areas * lengths.reshape(len(at), -1)
+        All patches have their level along one direction, so that their rules have equally many points.
+        """
+        k = int(self.along[0])
+        if k < 0:
+            (u, du), (v, dv) = (self.parameters(j, *self.rule(j, order)) for j in range(2))
+            at, lengths = np.broadcast_arrays(u[:, :, None], v[:, None, :]), du[:, :, None] * dv[:, None, :]
+        else:
+            across, width = self._across(1 - k, order)
+            n, m = across.shape
+            each = self[np.repeat(np.arange(n), m)]
+            ends = np.stack([each.low[:, k], each.crossing(k, across.ravel()), each.high[:, k]], axis=1)
+            t, w = gauss_rule(ends, order)
+            there, thickness = self.parameters(1 - k, across, width)
+            here, length = (part.reshape(n, m, -1) for part in each.parameters(k, t, w))
+            at, lengths = (here, np.broadcast_to(there[..., None], here.shape)), length * thickness[..., None]
+            at = at if k == 0 else at[::-1]
+        x, areas = self.surface.elements(np.stack(at, axis=-1).reshape(len(self), -1, 2))
+        return x, areas * lengths.reshape(len(self), -1)
 
     def rule(self, k: int, order: int) -> tuple[Array, Array]:
         """Return nodes and weights (n, m) along a direction."""
@@ -154,12 +189,12 @@ class Patches:
         return np.asarray(self.at[0, k] + self.scale[0, k] * np.sinh(np.linspace(t[0], t[1], count)))
 
     def halved(self) -> Self:
-        """Return the halves of the patches in each direction in which something varies."""
+        """Return the halves of the patches in each direction in which something varies, each with its own level."""
         found = self
         for k in range(2):
             if not self.uniform[k]:
                 found = found.cut(k, (found.low[:, k] + found.high[:, k]) / 2)
-        return found
+        return found if self.other is None else found.marked()
 
     def cut(self, k: int, at: Array | float) -> Self:
         """Return the parts below substituted parameters (n,) along a direction, followed by the parts above."""
@@ -173,6 +208,77 @@ class Patches:
             name: np.concatenate([getattr(part, name) for part in (self, *others)]) for name in self.arrays
         }
         return replace(self, **parts)
+
+    def marked(self) -> Self:
+        """Return the patches with their levels and directions determined anew."""
+        assert self.other is not None
+        u, v = (self.low[:, k, None] + (self.high - self.low)[:, k, None] * SAMPLES for k in range(2))
+        x, gap, heights = self.seen(*np.broadcast_arrays(u[:, :, None], v[:, None, :]))
+        # Take the level that divides a patch most evenly.
+        below, above = (np.mean(s * heights > self.noise, axis=(1, 2)) for s in (-1, 1))
+        best, share = np.argmax(below * above, axis=1), np.max(below * above, axis=1)
+        over = np.take_along_axis(heights, best[:, None, None, None], axis=-1)
+        # Choose a direction in which each line of nodes crosses the level once.
+        steps = [np.diff(over[..., 0], axis=k + 1) for k in range(2)]
+        turns = np.stack(
+            [
+                np.any((step.min(axis=k + 1) < -self.noise) & (step.max(axis=k + 1) > self.noise), axis=1)
+                for k, step in enumerate(steps)
+            ]
+        )
+        steepness = np.stack([np.abs(step).mean(axis=(1, 2)) for step in steps])
+        along = np.argmax(np.where(np.array(self.uniform)[:, None], -1.0, np.where(turns, 0.0, steepness)), axis=0)
+        # Two edges never coincide; where a gap jumps its level is on the edge. Far from the body edges do not matter.
+        edges = np.arange(heights.shape[-1]) < len(self.other.edges)
+        alike = np.mean((heights > 0) == (over > 0), axis=(1, 2))
+        apart = np.where(edges & edges[best, None], np.arange(len(edges)) != best[:, None], (alike > 0) & (alike < 1))
+        crossed = np.any((below * above > 0) & apart & (edges | edges[best, None]), axis=1)
+        crossed |= (share > 0) & turns[along, np.arange(len(along))]
+        crossed &= gap.min(axis=(1, 2)) < np.linalg.norm(x[:, -1, -1] - x[:, 0, 0], axis=-1)
+        along, none = np.where(share > 0, along, -1), np.full((len(self), 2), math.nan)
+        return replace(self, level=best, along=along, share=share, crossed=crossed, leaves=none)
+
+    def _across(self, j: int, order: int) -> tuple[Array, Array]:
+        """Return nodes and weights (n, m) across the direction of the level, cut where it leaves the patch."""
+        if self.uniform[j]:
+            return self.rule(j, order)
+        edges = np.column_stack([self.low[:, j], self.leaves, self.high[:, j]])
+        return gauss_rule(np.sort(edges, axis=1), order)
+
+    def left(self) -> Self:
+        """Return the patches with the points at which their levels leave them."""
+        leaves = self.leaves.copy()
+        for k in range(2):
+            chosen = self.along == k
+            if self.uniform[1 - k] or not chosen.any():
+                continue
+            passed = self[chosen]
+            ends = np.concatenate([passed.low[:, k], passed.high[:, k]])
+            leaves[chosen] = passed.joined(passed).crossing(1 - k, ends).reshape(2, -1).T
+        return replace(self, leaves=leaves)
+
+    def crossing(self, k: int, across: Array) -> Array:
+        """Return the coordinate along a direction at which each patch passes its level, at ``across``; else its end."""
+        from scipy.optimize.elementwise import find_root
+
+        def above(t: Array, across: Array, which: Array) -> Array:
+            _, _, heights = self[which].seen(*((t, across) if k == 0 else (across, t)))
+            return np.asarray(heights[np.arange(len(which)), self.level[which]])
+
+        ends = self.low[:, k], self.high[:, k]
+        reached: Any = {"fatol": self.noise}
+        found: Any = find_root(above, ends, args=(across, np.arange(len(self))), tolerances=reached)
+        return np.asarray(np.where(found.success, found.x, ends[1]))
+
+    def seen(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
+        """Return points (n, ..., 3) at substituted parameters (n, ...), their gaps to the other surface, and their
+        distances (n, ..., levels) [m] beyond edges, where the gap may jump, and above levels of the gap.
+        """
+        assert self.other is not None
+        at = np.stack([self.parameters(k, t)[0] for k, t in enumerate((u, v))], axis=-1)
+        x = self.surface.derivatives(at, FIRST_ORDER)[0]
+        near = self.other.nearest(x)
+        return x, near.gap, np.concatenate([near.beyond, near.gap[..., None] - self.levels], axis=-1)
 
 
 def outer_patches(
@@ -246,7 +352,9 @@ def _patches(
             edges = piece_edges(ends[:1], ends[1:], grain[k] / scale[k])[0]
         pairs.append(list(pairwise(edges)))
     low, high = np.moveaxis(np.array([(a, b) for a in pairs[0] for b in pairs[1]]), 2, 0)
-    return Patches(outer, np.tile(at, (len(low), 1)), np.tile(scale, (len(low), 1)), low, high, uniform)
+    none, share = np.full(len(low), -1), np.zeros(len(low))
+    at, scale = (np.tile(each, (len(low), 1)) for each in (at, scale))
+    return Patches(outer, uniform, at, scale, low, high, none, none, share, share > 0, 0.0 * low)
 
 
 class OutOfReachError(InputError):
@@ -290,7 +398,7 @@ class Rules:
     def __call__(self, patches: Patches, levels: Levels, inside: Levels) -> Array:
         """Return integrals (n, ...) over each patch, with the orders of its level and of its level inside."""
         found: dict[int, Array] = {}
-        ranks = np.stack([levels, inside, patches.rule_kinds], axis=1)
+        ranks = np.stack([levels, inside, patches.along], axis=1)
         for rank in np.unique(ranks, axis=0):
             where = np.flatnonzero((ranks == rank).all(axis=1))
             values = self._of_order(patches[where], ORDERS[rank[0]], int(rank[1]))
@@ -299,14 +407,16 @@ class Rules:
 
     def _of_order(self, patches: Patches, order: int, inside: int) -> Array:
         """Return integrals (n, ...) over each patch by one rule."""
-        found, begin = [], 0
+        found, begin, is_cut = [], 0, int(patches.along[0]) >= 0
+        # Of a cut one: points on two sides of the level, in several parts across, and a search on each line of nodes.
+        size, searches = (2 * SIDE_PARTS * order**2, SIDE_PARTS * order * ROOT_SAMPLES) if is_cut else (order**2, 0)
         while begin < len(patches):
             # One patch at first: the number of pairs of its points is not known yet.
-            each = self.each.get(inside, PAIRS_AT_ONCE) * patches.point_count(order)
+            each = self.each.get(inside, PAIRS_AT_ONCE) * size
             part = patches[begin : begin + max(1, int(PAIRS_AT_ONCE / each))]
             x, area = part.nodes(order)
             values, together = self.integrand(x.reshape(-1, 3), inside)
-            points = together + area.size * self.search + part.cost(order)
+            points = together + (area.size + len(part) * searches) * self.search
             found.append(np.einsum("nk...,nk->n...", values.reshape(*area.shape, *values.shape[1:]), area))
             self.points += points
             self.budget.spent += points + RULE_COST
@@ -383,7 +493,7 @@ def integral(
             _largest(known.over[raised], size) * LEAST_GAIN > over[raised]
         )
         if halved.any():
-            halves = known.patches[halved].halved()
+            halves = known.patches[halved].halved().left()
             # On half of a patch a rule is as accurate as one of higher order on the whole.
             times = len(halves) // int(halved.sum())
             start, inside = np.maximum(known.level[halved] - 1, patches.first_level), known.inside[halved]
@@ -402,17 +512,17 @@ def _expected(met: Sequence[tuple[float, float]], rtol: float) -> float:
 def _start(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested: bool) -> PatchResults:
     """Return results on patches by rules of some levels and of those before."""
     value = rules(patches, level, inside)
-    steps = range(1, patches.first_level + 1)
-    over = _changes(value, *(rules(patches, level - k, inside) for k in steps))
-    within = np.zeros_like(over)
-    if nested:
-        within = _changes(value, *(rules(patches, level, inside - k) for k in steps))
+
+    def changes(over: int, within: int) -> Array:
+        """Return the last two changes (n, 2, ...); zero if the earlier one is not known."""
+        steps = range(1, patches.first_level + 1)
+        found = [value, *(rules(patches, level - k * over, inside - k * within) for k in steps)]
+        both = [a - b for a, b in pairwise(found)]
+        return np.stack([*both, np.zeros_like(value)][:2], axis=1)
+
+    over = changes(1, 0)
+    within = changes(0, 1) if nested else np.zeros_like(over)
     return PatchResults(patches, level.copy(), inside.copy(), value, over, within, np.zeros(len(level), dtype=bool))
-
-
-def _changes(value: Array, before: Array, first: Array | None = None) -> Array:
-    """Return the last two changes of values (n, ...), shape (n, 2, ...); zero if the earlier one is not known."""
-    return np.stack([value - before, np.zeros_like(before) if first is None else before - first], axis=1)
 
 
 def _raise_level(rules: Rules, known: PatchResults, mask: NDArray[np.bool_], steps: tuple[int, int]) -> None:
@@ -434,186 +544,22 @@ def _largest(changes: Array, size: Array) -> Array:
     return np.asarray(np.maximum(last, before / LEAST_GAIN))
 
 
-SAMPLES = np.array([0, 1 / 128, 1 / 4, 1 / 2, 3 / 4, 127 / 128, 1])
-"""Points along each side of a patch at which it is tested for a level. The pairs at the ends give the slope there: a
-minimum or maximum between other points shows as a change of its sign.
-"""
-
-SLIGHT_CUT, CUT_HALVINGS = 0.1, 8
-"""A patch divided so unevenly that part times rest is below this is halved first. The second is the number of halvings
-in excess of those that reduce its area to the accuracy.
-"""
-
-MOST_CROSSED = 256
-"""Patches crossed by an edge in addition to their level are halved too, if there are at most this many: lines then
-cross rather than run along each other.
-"""
-
-SIDE_PARTS, ROOT_SAMPLES = 3, 10
-"""Parts of a side with separate lines of nodes, and gaps evaluated to locate a level on a line."""
-
-
-@dataclass(frozen=True)
-class LevelPatches(Patches):
-    """Patches with levels: of the gap to another surface, or of the distance beyond one of its edges.
-
-    ``level`` (n,) is the index of each patch's level, and ``along`` (n,) the direction in which it is located, -1 if it
-    has none. Heights above a level smaller than ``noise`` [m] count as zero.
-    """
-
-    arrays: ClassVar[Sequence[str]] = (*Patches.arrays, "level", "along", "share", "crossed", "leaves")
-
-    other: Surface
-    levels: tuple[float, ...]
-    noise: float
-    level: Levels
-    along: Levels
-    share: Array
-    """Fraction of each patch below the level times the fraction above."""
-    crossed: NDArray[np.bool_]
-    """True for patches that an edge divides in another way."""
-    leaves: Array
-    """Coordinates across that direction where the level leaves each patch at its ends (n, 2); NaN if unknown."""
-
-    @property
-    def first_level(self) -> int:
-        """Level of the first rule of patches: a cut may be curved between the lines on which it is located."""
-        return FIRST_LEVEL if self.other.search == 1 else super().first_level
-
-    @property
-    def rule_kinds(self) -> Levels:
-        """Direction of the level of each patch."""
-        return self.along
-
-    def halved(self) -> Self:
-        """Return the halves of the patches, each with its own level."""
-        return super().halved().marked().left()
-
-    def marked(self) -> Self:
-        """Return the patches with their levels and directions determined anew."""
-        u, v = (self.low[:, k, None] + (self.high - self.low)[:, k, None] * SAMPLES for k in range(2))
-        x, near = self.seen(*np.broadcast_arrays(u[:, :, None], v[:, None, :]))
-        heights = self.heights(near)
-        # Take the level that divides a patch most evenly.
-        below, above = (np.mean(s * heights > self.noise, axis=(1, 2)) for s in (-1, 1))
-        best, share = np.argmax(below * above, axis=1), np.max(below * above, axis=1)
-        over = np.take_along_axis(heights, best[:, None, None, None], axis=-1)
-        # Choose a direction in which each line of nodes crosses the level once.
-        steps = [np.diff(over[..., 0], axis=k + 1) for k in range(2)]
-        turns = np.stack(
-            [
-                np.any((step.min(axis=k + 1) < -self.noise) & (step.max(axis=k + 1) > self.noise), axis=1)
-                for k, step in enumerate(steps)
-            ]
-        )
-        steepness = np.stack([np.abs(step).mean(axis=(1, 2)) for step in steps])
-        along = np.argmax(np.where(np.array(self.uniform)[:, None], -1.0, np.where(turns, 0.0, steepness)), axis=0)
-        # Two edges never coincide; where a gap jumps its level is on the edge. Far from the body edges do not matter.
-        edges = np.arange(heights.shape[-1]) < len(self.other.edges)
-        alike = np.mean((heights > 0) == (over > 0), axis=(1, 2))
-        apart = np.where(edges & edges[best, None], np.arange(len(edges)) != best[:, None], (alike > 0) & (alike < 1))
-        crossed = np.any((below * above > 0) & apart & (edges | edges[best, None]), axis=1)
-        crossed |= (share > 0) & turns[along, np.arange(len(along))]
-        crossed &= near.gap.min(axis=(1, 2)) < np.linalg.norm(x[:, -1, -1] - x[:, 0, 0], axis=-1)
-        along, none = np.where(share > 0, along, -1), np.full((len(self), 2), math.nan)
-        return replace(self, level=best, along=along, share=share, crossed=crossed, leaves=none)
-
-    def nodes(self, order: int) -> tuple[Array, Array]:
-        """Return a rule's points (n, k, 3) on both sides of the level, and areas (n, k); patches are of one kind."""
-        k = int(self.along[0])
-        if k < 0:
-            return super().nodes(order)
-        across, width = self._across(1 - k, order)
-        n, m = across.shape
-        each = self[np.repeat(np.arange(n), m)]
-        t, w = gauss_rule(np.stack([each.low[:, k], each.crossing(k, across.ravel()), each.high[:, k]], axis=1), order)
-        there, thickness = self.parameters(1 - k, across, width)
-        here, length = (part.reshape(n, m, -1) for part in each.parameters(k, t, w))
-        at = (here, np.broadcast_to(there[..., None], here.shape))
-        return self.points(np.stack(at if k == 0 else at[::-1], axis=-1), length * thickness[..., None])
-
-    def point_count(self, order: int) -> int:
-        """Return a rule's points on each patch: on two sides of the level, in several parts across."""
-        return super().point_count(order) * (2 * SIDE_PARTS if self.along[0] >= 0 else 1)
-
-    def cost(self, order: int) -> int:
-        """Return the cost of the searches for the level on each line of nodes."""
-        return 0 if self.along[0] < 0 else len(self) * SIDE_PARTS * order * ROOT_SAMPLES * self.other.search
-
-    def _across(self, j: int, order: int) -> tuple[Array, Array]:
-        """Return nodes and weights (n, m) across the direction of the level, cut where it leaves the patch."""
-        if self.uniform[j]:
-            return self.rule(j, order)
-        edges = np.column_stack([self.low[:, j], self.leaves, self.high[:, j]])
-        return gauss_rule(np.sort(edges, axis=1), order)
-
-    def left(self) -> Self:
-        """Return the patches with the points at which their levels leave them."""
-        leaves = self.leaves.copy()
-        for k in range(2):
-            chosen = self.along == k
-            if self.uniform[1 - k] or not chosen.any():
-                continue
-            passed = self[chosen]
-            ends = np.concatenate([passed.low[:, k], passed.high[:, k]])
-            leaves[chosen] = passed.joined(passed).crossing(1 - k, ends).reshape(2, -1).T
-        return replace(self, leaves=leaves)
-
-    def divided(self, k: int) -> Self:
-        """Return the patches divided at their levels once and for all, if nothing varies across a direction."""
-        passed, rest = self[self.along == k], self[self.along != k]
-        return rest.joined(passed.cut(k, passed.crossing(k, passed.low[:, 1 - k])))
-
-    def crossing(self, k: int, across: Array) -> Array:
-        """Return the coordinate along a direction at which each patch passes its level, at ``across``; else its end."""
-        from scipy.optimize.elementwise import find_root
-
-        def above(t: Array, across: Array, which: Array) -> Array:
-            _, near = self[which].seen(*((t, across) if k == 0 else (across, t)))
-            return np.asarray(self.heights(near)[np.arange(len(which)), self.level[which]])
-
-        ends = self.low[:, k], self.high[:, k]
-        reached: Any = {"fatol": self.noise}
-        found: Any = find_root(above, ends, args=(across, np.arange(len(self))), tolerances=reached)
-        return np.asarray(np.where(found.success, found.x, ends[1]))
-
-    def seen(self, u: Array, v: Array) -> tuple[Array, Projection]:
-        """Return points (n, ..., 3) at substituted parameters (n, ...), and their projections on the other surface."""
-        at = np.stack([self.parameters(k, t)[0] for k, t in enumerate((u, v))], axis=-1)
-        x = self.surface.derivatives(at, FIRST_ORDER)[0]
-        return x, self.other.nearest(x)
-
-    def heights(self, near: Projection) -> Array:
-        """Return distances (n, ..., levels) [m] beyond edges, where the gap may jump, and above levels of the gap."""
-        return np.concatenate([near.beyond, near.gap[..., None] - self.levels], axis=-1)
-
-
-def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise: float, rtol: float) -> LevelPatches:
+def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise: float, rtol: float) -> Patches:
     """Return patches of a surface with the gap levels and edges of the other surface that divide them."""
     for k in range(2):
         if not patches.uniform[k]:
             # Points of least gap, towards which patches are graded, must be at corners of patches.
             around = (patches.low[:, k] < 0) & (patches.high[:, k] > 0)
             patches = patches[~around].joined(patches[around].cut(k, 0.0))
-    parts = {name: getattr(patches, name) for name in ("surface", "uniform", *Patches.arrays)}
-    none = np.zeros(len(patches), dtype=int)
-    found = LevelPatches(
-        **parts,
-        other=other,
-        levels=tuple(levels),
-        noise=noise,
-        level=none,
-        along=none,
-        share=0.0 * none,
-        crossed=none > 0,
-        leaves=np.zeros((len(patches), 2)),
-    )
-    found = found.marked()
+    found = replace(patches, other=other, levels=tuple(levels), noise=noise).marked()
     if any(found.uniform):
+        # Nothing varies across a direction: patches are divided at their levels once and for all.
+        k = found.uniform.index(False)
         for _ in range(len(levels) + len(other.edges)):
-            if np.all(found.along < 0):
+            passed, rest = found[found.along == k], found[found.along != k]
+            if not len(passed):
                 break
-            found = found.divided(found.uniform.index(False)).marked()
+            found = rest.joined(passed.cut(k, passed.crossing(k, passed.low[:, 1 - k]))).marked()
         return found
     for _ in range(CUT_HALVINGS - math.floor(math.log2(rtol) / 2)):
         slight = (found.along >= 0) & (found.share < SLIGHT_CUT)
@@ -621,5 +567,5 @@ def with_levels(patches: Patches, other: Surface, levels: Sequence[float], noise
             slight |= found.crossed
         if not slight.any():
             break
-        found = found[~slight].joined(Patches.halved(found[slight]).marked())
+        found = found[~slight].joined(found[slight].halved())
     return found.left()
