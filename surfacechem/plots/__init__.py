@@ -16,11 +16,13 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
+    from surfacechem.results.netcdf import Data
+
 __all__ = ["COLOURS", "STYLE", "figure", "opened", "save", "write"]
 
 
 def figure(
-    data: xarray.Dataset | str | Path | Sequence[xarray.Dataset | str | Path],
+    data: Data | xarray.Dataset | str | Path | Sequence[Data | xarray.Dataset | str | Path],
     variables: Sequence[str] | None = None,
     against: str | None = None,
     celsius: bool = False,
@@ -72,7 +74,7 @@ def figure(
         return sweep.figure(dataset, variables, against)
     from surfacechem.plots import time_series
 
-    if "time" not in dataset and "point" in dataset.dims:
+    if "time" not in dataset and "point" in dataset.sizes:
         return time_series.at_states(dataset, variables, against)
     return time_series.figure(dataset, variables, against)
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-import xarray
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -23,6 +22,7 @@ from surfacechem.plots import style, sweep, time_series
 from surfacechem.plots.style import COLOURS, symbol, unit
 from surfacechem.plots.time_series import Panel
 from surfacechem.results.dataset import changes_of
+from surfacechem.results.netcdf import Data
 
 LINE_STYLES = ("-", "--", ":", "-.")
 """Line styles of the variables of a panel; the colour identifies the dataset."""
@@ -39,9 +39,7 @@ MOST_DIFFERENCES = 4
 """Largest number of parameters in a legend; with more, titles or files identify the datasets better."""
 
 
-def figure(
-    datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None = None, against: str | None = None
-) -> Figure:
+def figure(datasets: Sequence[Data], variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
     """Draw several datasets, all of runs or all of sweeps over the same parameter."""
     over, panels = _content(datasets, variables, against)
     if not panels:
@@ -63,9 +61,7 @@ def figure(
     return plot
 
 
-def _content(
-    datasets: Sequence[xarray.Dataset], variables: Sequence[str] | None, against: str | None
-) -> tuple[str, list[Panel]]:
+def _content(datasets: Sequence[Data], variables: Sequence[str] | None, against: str | None) -> tuple[str, list[Panel]]:
     """Return the variable along the axis, and the panels."""
     sweeps = ["sweep" in dataset.attrs for dataset in datasets]
     if any("study" in dataset.attrs for dataset in datasets) or any(sweeps) != all(sweeps):
@@ -86,11 +82,11 @@ def colours_of(count: int) -> list[str]:
     return [to_hex(colour) for colour in matplotlib.colormaps["viridis"](np.linspace(0, 0.9, count))]
 
 
-def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
+def labels(datasets: Sequence[Data]) -> list[str]:
     r"""Label each dataset by its differences from the others: parameters and solver, else the title, else the file.
 
     >>> cases = [f"interface: {{friction: [coulomb: {{mu: {mu}}}]}}" for mu in (0.3, 0.6)]
-    >>> labels([xarray.Dataset(attrs={"case": text, "solver": "radau"}) for text in cases])
+    >>> labels([Data({}, {"case": text, "solver": "radau"}) for text in cases])
     ['$\\mu$ = 0.3', '$\\mu$ = 0.6']
     """
     known = [_settings(dataset) for dataset in datasets]
@@ -102,8 +98,13 @@ def labels(datasets: Sequence[xarray.Dataset]) -> list[str]:
         names = _short(paths)
         texts = [", ".join(f"{name} = {each.get(path, 'not given')}" for path, name in names.items()) for each in known]
     # Datasets that still have the same name are named by their files.
-    files = [Path(str(d.encoding.get("source", f"dataset {k}"))).stem for k, d in enumerate(datasets, 1)]
+    files = [_file_name(dataset, f"dataset {k}") for k, dataset in enumerate(datasets, 1)]
     return [text if texts.count(text) == 1 else file for text, file in zip(texts, files, strict=True)]
+
+
+def _file_name(dataset: Data, default: str) -> str:
+    """Return the name of the file of a dataset without its suffix."""
+    return Path(dataset.file).stem or default
 
 
 def _short(paths: Sequence[str]) -> dict[str, str]:
@@ -115,7 +116,7 @@ def _short(paths: Sequence[str]) -> dict[str, str]:
     }
 
 
-def _settings(dataset: xarray.Dataset) -> dict[str, str]:
+def _settings(dataset: Data) -> dict[str, str]:
     """Return the values of the case of a dataset by path, as written, with the changes of the run."""
     text, attributes = str(dataset.attrs.get("case", "")), dataset.attrs
     every = document.parse(text).walk() if text else ()
@@ -145,7 +146,7 @@ def _merge_panels(found: Sequence[Sequence[Panel]]) -> list[Panel]:
     return [Panel(*key, list(several)) for key, several in names.items()]
 
 
-def _labels_with_coincidences(datasets: Sequence[xarray.Dataset], shown: Sequence[str]) -> list[str]:
+def _labels_with_coincidences(datasets: Sequence[Data], shown: Sequence[str]) -> list[str]:
     """Return the labels of datasets, with a note on those whose curves are hidden below others."""
     names = labels(datasets)
     held = [[each[name].values.tobytes() if name in each else b"" for name in shown] for each in datasets]
@@ -154,7 +155,7 @@ def _labels_with_coincidences(datasets: Sequence[xarray.Dataset], shown: Sequenc
 
 
 def _draw(
-    ax: Axes, datasets: Sequence[xarray.Dataset], panel: Panel, over: str, colours: Sequence[str], begin: float | None
+    ax: Axes, datasets: Sequence[Data], panel: Panel, over: str, colours: Sequence[str], begin: float | None
 ) -> None:
     """Draw the variables of a panel, each in its line style, for all datasets that have them."""
     drawn = []
@@ -176,7 +177,7 @@ def _draw(
     style.legend(ax)
 
 
-def _label_axis(axes: Sequence[Axes], datasets: Sequence[xarray.Dataset], over: str, begin: float | None) -> None:
+def _label_axis(axes: Sequence[Axes], datasets: Sequence[Data], over: str, begin: float | None) -> None:
     """Label the shared axis: time, over decades from ``begin`` on, a variable, or the swept parameter."""
     first, values = datasets[0][over], np.concatenate([dataset[over].values for dataset in datasets])
     if over == "time":

@@ -7,13 +7,13 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from surfacechem.plots import style
 from surfacechem.plots.style import Array
+from surfacechem.results.netcdf import Data
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS
 
 FIELDS = ("gap", "traction")
@@ -29,7 +29,7 @@ PROFILE_REACH = 1.5
 """Ratio of the drawn distance to that over which the traction is significant."""
 
 
-def figure(dataset: xarray.Dataset) -> Figure:
+def figure(dataset: Data) -> Figure:
     """Draw the surfaces, the traction on them at several times, and the force over the approach."""
     with style.panels(6.4, 0.9 + HEIGHT * ROWS, ROWS) as (plot, grid):
         draw(grid[:, 0].tolist(), dataset)
@@ -37,12 +37,12 @@ def figure(dataset: xarray.Dataset) -> Figure:
     return plot
 
 
-def has_surfaces(dataset: xarray.Dataset) -> bool:
+def has_surfaces(dataset: Data) -> bool:
     """True if the dataset is of a run of two curved surfaces, with their fields."""
     return {*FIELDS, "opposite_z", "approach", "force"} <= set(dataset)
 
 
-def draw_below(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+def draw_below(axes: Sequence[Axes], dataset: Data) -> None:
     """Draw the surfaces on the last axes of a figure; the other axes share their x."""
     for ax in axes[: -ROWS - 1]:
         ax.sharex(axes[-ROWS - 1])
@@ -50,7 +50,7 @@ def draw_below(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     draw(axes[-ROWS:], dataset)
 
 
-def draw(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+def draw(axes: Sequence[Axes], dataset: Data) -> None:
     """Draw the panels on axes of a figure, one below the other."""
     # Each panel has its own x axis, whose label needs space above the panel below.
     engine: Any = axes[0].figure.get_layout_engine()
@@ -65,13 +65,13 @@ def draw(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     _draw_force(axes[2], dataset)
 
 
-def _is_axisymmetric(dataset: xarray.Dataset) -> bool:
+def _is_axisymmetric(dataset: Data) -> bool:
     """True if the gap does not change around the axis."""
     gap = dataset["gap"].values
     return bool(np.ptp(gap, axis=2).max() <= SQRT_EPS * np.abs(gap).max())
 
 
-def _is_facing(dataset: xarray.Dataset) -> NDArray[np.bool_]:
+def _is_facing(dataset: Data) -> NDArray[np.bool_]:
     """Return the mask of points on the side nearest to the other body: from above a closed body hides itself."""
     from scipy.ndimage import label
 
@@ -83,9 +83,9 @@ def _is_facing(dataset: xarray.Dataset) -> NDArray[np.bool_]:
     return np.asarray(parts == parts[np.unravel_index(np.argmin(dataset["gap"].values[0]), parts.shape)])
 
 
-def _section(dataset: xarray.Dataset) -> tuple[Array, Any]:
+def _section(dataset: Data) -> tuple[Array, Any]:
     """Return distances along a section through the nearest point [m], and the indices of its points."""
-    column = int(np.unravel_index(np.argmin(dataset["gap"].values[0]), dataset["gap"].shape[1:])[1])
+    column = int(np.unravel_index(np.argmin(dataset["gap"].values[0]), dataset["gap"].values.shape[1:])[1])
     x, y = (dataset[f"surface_{axis}"].values for axis in "xy")
     rows = np.flatnonzero(_is_facing(dataset)[:, column])
     if _is_axisymmetric(dataset):
@@ -98,7 +98,7 @@ def _section(dataset: xarray.Dataset) -> tuple[Array, Any]:
     return x[at] if np.ptp(x[at]) > np.ptp(y[at]) else y[at], at
 
 
-def _reach(dataset: xarray.Dataset, along: Array, at: Any) -> float:
+def _reach(dataset: Data, along: Array, at: Any) -> float:
     """Return the distance over which the traction is significant [m]."""
     size = np.abs(dataset["traction"].values[:, *at]).max(axis=0)
     # Bodies are much larger than the range of their interaction, which would be invisible at their scale.
@@ -107,7 +107,7 @@ def _reach(dataset: xarray.Dataset, along: Array, at: Any) -> float:
     return min(PROFILE_REACH * float(felt.max(initial=0.0)), whole) or whole
 
 
-def _drawn_times(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
+def _drawn_times(dataset: Data) -> Iterator[tuple[int, Any, str]]:
     """Yield the times that are drawn, with colour and label: the least and the largest approach and some between."""
     approach = dataset["approach"].values
     # Runs may rest for long: approaches are spread by their rank, not by time.
@@ -118,7 +118,7 @@ def _drawn_times(dataset: xarray.Dataset) -> Iterator[tuple[int, Any, str]]:
         yield k, matplotlib.colormaps["viridis"](share * 0.9), f"$g_n$ = {approach[k] / size:.3g} {text}"
 
 
-def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool, along: Array, at: Any, reach: float) -> None:
+def _draw_profiles(ax: Axes, dataset: Data, even: bool, along: Array, at: Any, reach: float) -> None:
     """Draw a section through both bodies, the upper one at several approaches."""
     signs = (1, -1) if even else (1,)
     for sign in signs:
@@ -139,7 +139,7 @@ def _draw_profiles(ax: Axes, dataset: xarray.Dataset, even: bool, along: Array, 
     style.legend(ax)
 
 
-def _draw_tractions(ax: Axes, dataset: xarray.Dataset, along: Array, at: Any, reach: float) -> None:
+def _draw_tractions(ax: Axes, dataset: Data, along: Array, at: Any, reach: float) -> None:
     """Draw the traction over the distance from the axis at several approaches."""
     shown = np.abs(along) <= reach
     values = dataset["traction"].values[:, *at]
@@ -151,7 +151,7 @@ def _draw_tractions(ax: Axes, dataset: xarray.Dataset, along: Array, at: Any, re
     style.label(ax.xaxis, "Distance from the axis", "m", np.array([reach]))
 
 
-def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
+def _draw_field(ax: Axes, dataset: Data) -> None:
     """Draw the traction over the surface at the time when it is largest."""
     facing = _is_facing(dataset)
     seen: Any = np.ix_(facing.any(axis=1), facing.any(axis=0))
@@ -179,7 +179,7 @@ def _draw_field(ax: Axes, dataset: xarray.Dataset) -> None:
     style.label(ax.yaxis, "y", "m", shown[1])
 
 
-def _draw_force(ax: Axes, dataset: xarray.Dataset) -> None:
+def _draw_force(ax: Axes, dataset: Data) -> None:
     """Draw the force over the approach, and the force of the local law."""
     approach, force = dataset["g_n"].values, dataset["t_n"].values
     style.draw_curve(ax, dataset, "g_n", force, label="force")

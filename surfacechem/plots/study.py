@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import cycle
 from typing import Any
 
 import numpy as np
-import xarray
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -15,11 +15,12 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import NullFormatter
 
 from surfacechem.plots import style
-from surfacechem.plots.style import COLOURS
+from surfacechem.plots.style import COLOURS, Array
+from surfacechem.results.netcdf import Data
 from surfacechem.tolerances import EPS
 
 
-def figure(dataset: xarray.Dataset) -> Figure:
+def figure(dataset: Data) -> Figure:
     """Draw the figure of a study, by the attribute that names its kind."""
     return stability(dataset) if str(dataset.attrs["study"]) == "stability" else precision(dataset)
 
@@ -36,10 +37,12 @@ ERRORS = {
     "energy_error": "energy residual",
 }
 
+RUN_TIMES = ("run_seconds", "run_seconds_median", "stepping_seconds")
+
 POINT_DIMENSIONS, CASE_DIMENSIONS = ("case", "solver", "tolerance"), ("case",)
 NUMBER_DIMENSIONS = {
     "tolerance": ("tolerance",),
-    **dict.fromkeys((*ERRORS, "run_seconds", "run_seconds_median", "stepping_seconds"), POINT_DIMENSIONS),
+    **dict.fromkeys((*ERRORS, *RUN_TIMES), POINT_DIMENSIONS),
     **dict.fromkeys(("uncertainty_max", "uncertainty_event"), CASE_DIMENSIONS),
 }
 # Variables that are read, with their dimensions.
@@ -55,7 +58,7 @@ SOLVER_COLOURS = (*COLOURS, "black")
 BELOW, STEPPING = "below the uncertainty of the reference", "inside the library's own steps"
 
 
-def precision(dataset: xarray.Dataset) -> Figure:
+def precision(dataset: Data) -> Figure:
     """Draw run time over error, one row per case.
 
     Bars reach from the least to the median time. Dashed lines are the times inside a library's own steps, without those
@@ -63,20 +66,21 @@ def precision(dataset: xarray.Dataset) -> Figure:
     crosses at the right edge are failed solves, at the time until the failure.
     """
     style.check_variables(dataset, NUMBER_DIMENSIONS, TEXT_DIMENSIONS)
-    drawn = [name for name in ERRORS if bool((dataset[name] > 0).any())] or ["energy_error"]
+    drawn = [name for name in ERRORS if (dataset[name].values > 0).any()] or ["energy_error"]
     rows, solvers = dataset.sizes["case"], dataset.sizes["solver"]
     markers = list(zip(cycle(SOLVER_COLOURS), "osD^vPX" * solvers, strict=False))
     with style.panels(0.6 + 3.2 * len(drawn), 0.7 + 2.6 * rows, rows, len(drawn), sharey="row") as (plot, grid):
         for i in range(rows):
-            case = dataset.isel(case=i)
             for ax, name in zip(grid[i], drawn, strict=True):
                 style.make_logarithmic(ax.xaxis, ax.yaxis)
                 for axis in (ax.xaxis, ax.yaxis):
                     axis.set_minor_formatter(NullFormatter())  # labels within a decade would overlap
-                limit = float(case[name.replace("error_", "uncertainty_")]) if name.startswith("error_") else np.nan
+                own = name.startswith("error_")
+                limit = float(dataset[name.replace("error_", "uncertainty_")].values[i]) if own else np.nan
                 for k in range(solvers):
-                    _draw_solver(ax, case.isel(solver=k), name, limit, *markers[k])
-                finite = case[name].values[np.isfinite(case[name].values)]
+                    cells = {each: dataset[each].values[i, k] for each in (*ERRORS, *RUN_TIMES, "status")}
+                    _draw_solver(ax, cells, name, limit, *markers[k])
+                finite = dataset[name].values[i][np.isfinite(dataset[name].values[i])]
                 if positive := finite[finite > 0].tolist():  # Matplotlib's margins of a single value may have no width
                     ax.set_xlim(max(min(positive), LEAST_ERROR) / 3, 3 * max(*positive, LEAST_ERROR))
                 if np.isfinite(limit):
@@ -84,37 +88,40 @@ def precision(dataset: xarray.Dataset) -> Figure:
                     ax.set_xlim(left=max(min([limit, *finite]) / 3, LEAST_ERROR / 2))
                 ax.set_xlabel(ERRORS[name] if i == rows - 1 else "")
             grid[i, 0].set_ylabel("run time [s]")
-            grid[i, 0].set_title(str(case["case_name"].values), loc="left")
+            grid[i, 0].set_title(str(dataset["case_name"].values[i]), loc="left")
         plot.legend(handles=_legend(dataset, markers), loc="outside lower center", ncols=4)
     return plot
 
 
-def _draw_solver(ax: Axes, cells: xarray.Dataset, name: str, limit: float, colour: str, marker: str) -> None:
-    x, y = np.maximum(cells[name].values, LEAST_ERROR), cells["run_seconds"].values
-    shown = np.isfinite(x) & np.isfinite(y) & ((cells[name].values > 0) | np.isfinite(limit))
+def _draw_solver(ax: Axes, cells: Mapping[str, Array], name: str, limit: float, colour: str, marker: str) -> None:
+    x, y = np.maximum(cells[name], LEAST_ERROR), cells["run_seconds"]
+    shown = np.isfinite(x) & np.isfinite(y) & ((cells[name] > 0) | np.isfinite(limit))
     ax.plot(x[shown], y[shown], color=colour, linewidth=1.0)
-    inside = cells["stepping_seconds"].values
+    inside = cells["stepping_seconds"]
     stepped = shown & np.isfinite(inside)
     ax.plot(x[stepped], inside[stepped], "--", color=colour, linewidth=0.8, alpha=0.8)
     # Single precision may round the median of a few equal times below them.
-    spread = np.array([np.zeros(shown.sum()), np.maximum(cells["run_seconds_median"].values - y, 0.0)[shown]])
+    spread = np.array([np.zeros(shown.sum()), np.maximum(cells["run_seconds_median"] - y, 0.0)[shown]])
     ax.errorbar(x[shown], y[shown], spread, fmt="none", ecolor=colour, elinewidth=0.6, alpha=0.6)
     for below, fill in ((True, "white"), (False, colour)):
         some = shown & ((x < limit) == below)
         ax.plot(x[some], y[some], marker, color=colour, markerfacecolor=fill, markersize=4.5)
-    lost = y[(cells["status"].values == "failed") & np.isfinite(y)]
+    lost = y[(cells["status"] == "failed") & np.isfinite(y)]
     ax.plot(np.full(len(lost), 0.985), lost, "x", color=colour, markersize=5, transform=ax.get_yaxis_transform())
 
 
-def _legend(dataset: xarray.Dataset, markers: list[tuple[str, str]]) -> list[Line2D]:
-    status, handles = dataset["status"], []
+def _legend(dataset: Data, markers: list[tuple[str, str]]) -> list[Line2D]:
+    status, handles = dataset["status"].values, []
     for k, (colour, marker) in enumerate(markers[: dataset.sizes["solver"]]):
-        out = " (left out)" if bool((status.isel(solver=k) == "omitted").all()) else ""
+        out = " (left out)" if bool((status[:, k] == "omitted").all()) else ""
         label = f"{dataset['solver_name'].values[k]}{out}"
         handles.append(Line2D([], [], color=colour, marker=marker, markersize=4.5, linewidth=1.0, label=label))
-    below = (dataset[f"error_{kind}"] < dataset[f"uncertainty_{kind}"] for kind in ("max", "event"))
+    below = (
+        dataset[f"error_{kind}"].values < dataset[f"uncertainty_{kind}"].values[:, None, None]
+        for kind in ("max", "event")
+    )
     marks: list[tuple[bool, str, dict[str, Any]]] = [
-        (bool(np.isfinite(dataset["stepping_seconds"]).any()), STEPPING, {"linestyle": "--", "linewidth": 0.8}),
+        (bool(np.isfinite(dataset["stepping_seconds"].values).any()), STEPPING, {"linestyle": "--", "linewidth": 0.8}),
         (bool((status == "failed").any()), "failed", {"marker": "x", "linestyle": "none"}),
         (any(bool(b.any()) for b in below), BELOW, {"marker": "o", "markerfacecolor": "white", "linestyle": "none"}),
     ]
@@ -140,7 +147,7 @@ OUTCOMES = {
 DARK_DIGITS = 8.0
 
 
-def stability(dataset: xarray.Dataset) -> Figure:
+def stability(dataset: Data) -> Figure:
     """Draw digits as a heat map, one row per regime: possible digits by the problem's condition, then those of each
     solver; regimes become more extreme to the right.
     """

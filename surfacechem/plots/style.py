@@ -7,14 +7,14 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
-import xarray
 from matplotlib.axes import Axes
 from matplotlib.axis import XAxis, YAxis
 from matplotlib.backend_bases import get_registered_canvas_class
@@ -27,8 +27,11 @@ from numpy.typing import NDArray
 from surfacechem.contracts.units import ZERO_CELSIUS
 from surfacechem.errors import InputError, Place
 from surfacechem.quantities import GREEK, SUPERSCRIPTS, VARIABLES, raised, spelled
-from surfacechem.results.netcdf import read_netcdf, reading, replacing
+from surfacechem.results.netcdf import Data, DataVariable, read_netcdf, reading, replacing
 from surfacechem.tolerances import RUN_EPS
+
+if TYPE_CHECKING:
+    import xarray
 
 Array = NDArray[np.float64]
 
@@ -138,30 +141,30 @@ def write(plot: Figure, target: Path) -> None:
         save(plot, temporary, target.suffix.lower().removeprefix("."))
 
 
-def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
-    """Return a dataset, read from its netCDF file if need be; InputError if the file is none."""
-    if isinstance(data, xarray.Dataset):
-        return data
+def opened(data: Data | xarray.Dataset | str | Path) -> Data:
+    """Return a dataset, read from its netCDF file or its store if need be; InputError if the file is none."""
+    if not isinstance(data, str | Path):
+        return data if isinstance(data, Data) else Data.of(data)
     path = Path(data)
     if path.suffix == ".zarr":
         from surfacechem.results import store
 
-        return store.opened(path)
-
+        return Data.of(store.opened(path))
     return reading(path, lambda: read_netcdf(path))
 
 
-def in_celsius(dataset: xarray.Dataset) -> xarray.Dataset:
+def in_celsius(dataset: Data) -> Data:
     """Return the dataset with its temperatures in degrees Celsius."""
-    found = dataset.assign_coords()  # a shallow copy
-    for name, values in dataset.variables.items():
-        if values.attrs.get("units") == "K":
-            found[name] = (values.dims, values.values - float(ZERO_CELSIUS), {**values.attrs, "units": "degC"})
-    return found
+    found = {
+        name: replace(each, source=each.values - float(ZERO_CELSIUS), attrs={**each.attrs, "units": "degC"})
+        for name, each in dataset.variables.items()
+        if each.attrs.get("units") == "K"
+    }
+    return replace(dataset, variables={**dataset.variables, **found})
 
 
 def check_variables(
-    dataset: xarray.Dataset, numbers: Mapping[str, tuple[str, ...]], texts: Mapping[str, tuple[str, ...]] | None = None
+    dataset: Data, numbers: Mapping[str, tuple[str, ...]], texts: Mapping[str, tuple[str, ...]] | None = None
 ) -> None:
     """Raise InputError if variables to be drawn are missing, or are not numbers in double precision, or texts, over
     these dimensions, as surfacechem writes them.
@@ -171,7 +174,7 @@ def check_variables(
             raise InputError(f"has no variable '{name}', as datasets of surfacechem have.", place_of(dataset))
         if dataset[name].dims != dimensions:
             raise InputError(f"{name} does not go over {' and '.join(dimensions)}.", place_of(dataset))
-        if name in numbers and dataset[name].dtype.kind != "f":
+        if name in numbers and dataset[name].kind != "f":
             raise InputError(f"{name} does not hold numbers in double precision.", place_of(dataset))
 
 
@@ -185,7 +188,7 @@ def evenly_spread(count: int, most: int) -> list[int]:
     return chosen
 
 
-def attribute(dataset: xarray.Dataset, name: str) -> float | None:
+def attribute(dataset: Data, name: str) -> float | None:
     """Return the value of a global attribute; None if there is none."""
     value = dataset.attrs.get(name)
     if value is not None and not isinstance(value, (float, int, np.number)):
@@ -193,13 +196,12 @@ def attribute(dataset: xarray.Dataset, name: str) -> float | None:
     return None if value is None else float(value)
 
 
-def place_of(dataset: xarray.Dataset) -> Place | None:
+def place_of(dataset: Data) -> Place | None:
     """Return the file of a dataset."""
-    source = dataset.encoding.get("source")
-    return Place(str(source)) if source else None
+    return Place(dataset.file) if dataset.file else None
 
 
-def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0, more: str = "") -> None:
+def headings(plot: Figure, ax: Axes, dataset: Data, above: float = 0.0, more: str = "") -> None:
     """Write title, end, error, solver and the note ``more``, ``above`` points above the axes."""
     attributes = dataset.attrs
     title = wrap(str(attributes.get("title", "")), int(TITLE_PER_INCH * plot.get_figwidth())) or [""]
@@ -207,7 +209,7 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     facts = [str(attributes.get("reason", "")) or _ends(dataset)]
     if (error := error_of(dataset)) is not None:
         exact = str(attributes.get("error_source", "")).startswith("exact")
-        exact = exact or any(str(name).endswith("_exact") for name in dataset)
+        exact = exact or any(name.endswith("_exact") for name in dataset)
         kind = "of the checked runs" if "checked_error" in dataset else "(exact solution)" if exact else "(estimate)"
         facts.append("error unknown" if np.isnan(error) else f"error {error:.1e} {kind}")
     if "solver" in attributes and (rtol := attribute(dataset, "rtol")) is not None:
@@ -224,14 +226,14 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset, above: float = 0.0
     ax.set_title("\n".join(lines), loc="left", pad=6 + above, **NOTE_STYLE)
 
 
-def error_of(dataset: xarray.Dataset, names: Sequence[str] = ()) -> float | None:
+def error_of(dataset: Data, names: Sequence[str] = ()) -> float | None:
     """Return the largest relative error of variables that have one of their own, else that of the dataset, of a store
     that of its checked runs; None if none is told.
 
     Where a store keeps extremes its error is theirs, far more than that of other variables.
     """
     own = [float(dataset[n].attrs["error"]) for n in names if n in dataset and "error" in dataset[n].attrs]
-    extremes = {str(name) for name in dataset if str(name).endswith(("_max", "_min"))}
+    extremes = {name for name in dataset if name.endswith(("_max", "_min"))}
     if not own and "checked_error" in dataset and not (names and extremes and extremes.isdisjoint(names)):
         own = [*dataset["checked_error"].values, *dataset["hardest_error"].values]
     return float(np.fmax.reduce(own)) if own else attribute(dataset, "error")
@@ -259,24 +261,24 @@ STATUS_MARKERS = dict(zip((*WITHOUT_END, STOPPED), "xds", strict=True))
 """Markers of these statuses."""
 
 
-def _ends(dataset: xarray.Dataset) -> str:
+def _ends(dataset: Data) -> str:
     """Describe the numbers of runs of a store by status; '' if the dataset is no store."""
     words = str(dataset["status"].attrs.get("flag_meanings", "")).split() if "status" in dataset else []
     counts = {word: int(np.count_nonzero(dataset["status"].values == code)) for code, word in enumerate(words)}
-    counts |= {"missing": dataset["status"].size - sum(counts.values())} if words else {}
+    counts |= {"missing": dataset["status"].values.size - sum(counts.values())} if words else {}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count)
 
 
-def has_no_end(dataset: xarray.Dataset, *words: str) -> NDArray[np.bool_]:
+def has_no_end(dataset: Data, *words: str) -> NDArray[np.bool_]:
     """Return the mask of runs of a sweep with one of these statuses, which a store has as codes."""
     status = dataset["status"]
     codes = str(status.attrs.get("flag_meanings", "")).split()
     return np.isin(status.values, [codes.index(word) if codes else word for word in words])
 
 
-def mark_without_end(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+def mark_without_end(axes: Sequence[Axes], dataset: Data) -> None:
     """Mark failed, refused and stopped runs on the axis of the swept parameter, which then spans the whole sweep."""
-    x = dataset[str(dataset["status"].dims[0])].values
+    x = dataset[dataset["status"].dims[0]].values
     for word in STATUS_MARKERS:
         found = has_no_end(dataset, word)
         where = found & ~(found.all() and word == STOPPED)
@@ -321,41 +323,41 @@ def legend(ax: Axes) -> None:
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), borderaxespad=0.4, handlelength=1.6)
 
 
-def meaning(values: xarray.DataArray) -> str:
+def meaning(values: DataVariable) -> str:
     """Return the meaning of a variable: its long name without details.
 
-    >>> meaning(xarray.DataArray(0.0, attrs={"long_name": "state of bonds: 1 is bonded"}))
+    >>> meaning(DataVariable("phi", (), 0.0, {"long_name": "state of bonds: 1 is bonded"}))
     'State of bonds'
     """
     text = re.split(r":| \(-?\d+:", str(values.attrs.get("long_name", values.name)))[0]
     return text[:1].upper() + text[1:]
 
 
-def variable_words(values: xarray.DataArray) -> str:
+def variable_words(values: DataVariable) -> str:
     """Return the meaning of a variable and its symbol."""
-    return f"{meaning(values)} {symbol(str(values.name))}"
+    return f"{meaning(values)} {symbol(values.name)}"
 
 
-def quantity_words(values: xarray.DataArray) -> str:
+def quantity_words(values: DataVariable) -> str:
     """Return the symbol of a variable, or words for a time to a value or an event."""
-    name = str(values.name)
+    name = values.name
     if not name.startswith("time_"):
         return symbol(name)
     words = str(values.attrs.get("long_name", name)) if name.startswith("time_to_") else name.replace("_", " ")
     return words[:1].upper() + words[1:]
 
 
-def is_mode(values: xarray.DataArray | xarray.Variable) -> bool:
+def is_mode(values: DataVariable) -> bool:
     """True for a mode of the automaton, according to the long name of a variable."""
     return str(values.attrs.get("long_name", "")).startswith("mode (")
 
 
-def drawn_as(values: xarray.DataArray | xarray.Variable) -> Any:
+def drawn_as(values: DataVariable) -> Any:
     """Return the draw style of a variable between outputs: a step for a mode."""
     return "steps-post" if is_mode(values) else "default"
 
 
-def draw_curve(ax: Axes, dataset: xarray.Dataset, over: str, values: Array, **look: Any) -> None:
+def draw_curve(ax: Axes, dataset: Data, over: str, values: Array, **look: Any) -> None:
     """Draw values over a variable, dotted where they jump between two outputs at the same time, or with the jump of
     an event between them: a jump has no values in between.
     """
@@ -373,7 +375,7 @@ def draw_curve(ax: Axes, dataset: xarray.Dataset, over: str, values: Array, **lo
         ax.plot(x, sides, ":", color=line.get_color(), linewidth=0.9, zorder=line.get_zorder() - 0.1)
 
 
-def unit(values: xarray.DataArray | xarray.Variable) -> str:
+def unit(values: DataVariable) -> str:
     """Return the unit of a variable in the notation of the CF conventions."""
     return str(values.attrs.get("units", "1"))
 
@@ -427,7 +429,7 @@ def over_decades(values: Array) -> bool:
     return bool(np.ptp(steps) > FLAT * np.max(np.abs(steps)))
 
 
-def draw_parameter(axis: XAxis | YAxis, values: xarray.DataArray, decades: bool | None = None) -> None:
+def draw_parameter(axis: XAxis | YAxis, values: DataVariable, decades: bool | None = None) -> None:
     """Label the axis of a swept parameter with its meaning, or its name if that says more, and unit; logarithmic if the
     values need it, or if ``decades`` is True.
     """
@@ -454,15 +456,15 @@ def _middle_of_decades(values: Array) -> Array:
     return np.sqrt(sizes.min(keepdims=True) * sizes.max(keepdims=True)) if len(sizes) else np.zeros(1)
 
 
-def parameter_words(values: xarray.DataArray) -> str:
+def parameter_words(values: DataVariable) -> str:
     """Return words for a swept parameter, with its owner.
 
     >>> said = {"long_name": "rate of change (loading.f.ramp.rate)", "units": "N s-1"}
-    >>> parameter_words(xarray.DataArray(1e-9, name="rate", attrs=said))
+    >>> parameter_words(DataVariable("rate", (), 1e-9, said))
     'Loading rate of $f$'
-    >>> parameter_words(xarray.DataArray(1e-9, name="loading_f", attrs={"long_name": "value (loading.f.level)"}))
+    >>> parameter_words(DataVariable("loading_f", (), 1e-9, {"long_name": "value (loading.f.level)"}))
     'Force per bond $f$'
-    >>> parameter_words(xarray.DataArray(1e-3, name="rate", attrs={"long_name": "rate (loading.w_t.ramp.rate)"}))
+    >>> parameter_words(DataVariable("rate", (), 1e-3, {"long_name": "rate (loading.w_t.ramp.rate)"}))
     'Rate of change of $w_{t}$'
     """
     load = re.search(r"\(loading\.(\w+)\.[\w.-]*rate\)$", str(values.attrs.get("long_name", "")))
@@ -474,13 +476,13 @@ def parameter_words(values: xarray.DataArray) -> str:
     if held and held[1] in VARIABLES:
         text = VARIABLES[held[1]].long_name.partition(",")[0]
         return f"{text[:1].upper()}{text[1:]} {symbol(held[1])}"
-    return (str(values.name).replace("_", " ") if words == "Value" else words) + owner(values)
+    return (values.name.replace("_", " ") if words == "Value" else words) + owner(values)
 
 
-def owner(values: xarray.DataArray) -> str:
+def owner(values: DataVariable) -> str:
     """Return the owner of a swept parameter, by the path at the end of its long name; '' if its own name contains it.
 
-    >>> owner(xarray.DataArray(1.0, name="C", attrs={"long_name": "heat capacity per area (bodies.upper.C)"}))
+    >>> owner(DataVariable("C", (), 1.0, {"long_name": "heat capacity per area (bodies.upper.C)"}))
     ' (upper)'
     """
     path = str(values.attrs.get("long_name", "")).rpartition("(")[2].removesuffix(")").split(".")
@@ -498,19 +500,19 @@ def parameter_name(name: str) -> str:
     return symbol(name) if len(head) == 1 or head in GREEK else name.replace("_", " ")
 
 
-def value_label(values: xarray.DataArray, place: int) -> str:
+def value_label(values: DataVariable, place: int) -> str:
     """Label a value of a swept parameter with name and unit, in the prefix of all values.
 
-    >>> rates = xarray.DataArray([0, -1e-10, 2e-9], name="rate", attrs={"units": "N s-1"})
+    >>> rates = DataVariable("rate", ("rate",), [0, -1e-10, 2e-9], {"units": "N s-1"})
     >>> [value_label(rates, k) for k in range(3)]
     ['rate = 0 pN s⁻¹', 'rate = −100 pN s⁻¹', 'rate = 2000 pN s⁻¹']
-    >>> value_label(xarray.DataArray([1e-13, 1e-7], name="rate", attrs=rates.attrs), 1)
+    >>> value_label(DataVariable("rate", ("rate",), [1e-13, 1e-7], rates.attrs), 1)
     'rate = 10⁵ pN s⁻¹'
     """
     text, size = prefixed(unit(values), _middle_of_decades(values.values))
     digits, _, power = f"{values.values[place] / size:.4g}".partition("e")
     value = raised(f"{digits}·10^{int(power)}").removeprefix("1·") if power else digits
-    return minus(f"{parameter_name(str(values.name))} = {value} {'' if text == '1' else text}".rstrip())
+    return minus(f"{parameter_name(values.name)} = {value} {'' if text == '1' else text}".rstrip())
 
 
 def minus(text: str) -> str:
@@ -522,16 +524,16 @@ def minus(text: str) -> str:
     return re.sub(r"(?<!\w)-(?=[\d.])|(?<=\de)-(?=\d)", "\N{MINUS SIGN}", text)
 
 
-def member_name(dataset: xarray.Dataset, place: Sequence[int]) -> str:
+def member_name(dataset: Data, place: Sequence[int]) -> str:
     """Return the parameters of a run of a sweep, by its index along each of them."""
-    return ", ".join(value_label(dataset[str(name)], k) for name, k in zip(dataset["status"].dims, place, strict=True))
+    return ", ".join(value_label(dataset[name], k) for name, k in zip(dataset["status"].dims, place, strict=True))
 
 
-def curves_by_second(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:
+def curves_by_second(dataset: Data, values: Array) -> list[tuple[Array, str]]:
     """Return values of a sweep over the first parameter, one curve per value of the second, or for some of many."""
     if values.ndim == 1:
         return [(values, "")]
-    second = dataset[str(dataset["status"].dims[1])]
+    second = dataset[dataset["status"].dims[1]]
     chosen = evenly_spread(values.shape[1], MOST_CURVES)
     left = f" ({len(chosen)} of {values.shape[1]})" if len(chosen) < values.shape[1] else ""
     return [(values[:, j], value_label(second, j) + (left if j == chosen[-1] else "")) for j in chosen]
@@ -585,7 +587,7 @@ def label(
         axis.set_major_formatter(lambda value, _: Formatter.fix_minus(f"{value / size:.12g}"))
 
 
-def label_variable(axis: XAxis | YAxis, values: xarray.DataArray) -> None:
+def label_variable(axis: XAxis | YAxis, values: DataVariable) -> None:
     """Label a linear axis with meaning, symbol and unit of a variable."""
     label(axis, variable_words(values), unit(values), values.values)
 

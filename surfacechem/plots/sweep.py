@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import xarray
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
@@ -18,6 +18,7 @@ from surfacechem.format.plans import RUN_DIMENSION, STATISTICS, Plan, name_parts
 from surfacechem.plots import style
 from surfacechem.plots.style import COLOURS, MOST_CURVES, Array, symbol, unit, varies
 from surfacechem.plots.time_series import PANELS, Panel, of_kind, wants_log_axis
+from surfacechem.results.netcdf import Data, DataVariable
 
 MOST_MEMBERS = 100
 """Largest number of curves of a sample; of more runs an evenly spread subset is drawn."""
@@ -50,14 +51,12 @@ SEEN_PART = 0.99
 """Fraction of the largest value of a variable that some output must reach; otherwise a note is written."""
 
 
-def figure_of_members(
-    dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], variables: Sequence[str] | None = None
-) -> Figure:
+def figure_of_members(dataset: Data, plan: Plan, axes: Sequence[str], variables: Sequence[str] | None = None) -> Figure:
     """Draw a grid of two parameters, a sample, or a grid of more parameters."""
     dataset = with_final_bonds(dataset, axes)
-    parameters = [str(name) for name, x in dataset.coords.items() if len(x.dims) == 1 and x.dims[0] in axes]
+    parameters = [name for name in dataset.coords if len(dataset[name].dims) == 1 and dataset[name].dims[0] in axes]
     names = chosen(dataset, axes, variables)
-    if dataset[names[0]].ndim > len(axes):
+    if len(dataset[names[0]].dims) > len(axes):
         return curves(dataset, axes, names)
     if len(axes) == 2 and RUN_DIMENSION not in axes:
         return heat_maps(dataset, plan, axes, names)
@@ -65,22 +64,22 @@ def figure_of_members(
     return effects(dataset, plan, axes, parameters, names)
 
 
-def chosen(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
+def chosen(dataset: Data, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
     """Return the variables to be drawn: those asked for, else final values that differ between runs."""
     known = number_names(dataset, axes)
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
     return list(dict.fromkeys(variables)) if variables else varying_numbers(dataset, axes, known)
 
 
-def number_names(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
+def number_names(dataset: Data, axes: Sequence[str]) -> list[str]:
     """Return the names of numbers of every run, not only of checked ones, at its end or along it."""
-    return [str(n) for n, x in dataset.data_vars.items() if x.dtype.kind == "f" and x.dims[: len(axes)] == tuple(axes)]
+    return [n for n in dataset if dataset[n].kind == "f" and dataset[n].dims[: len(axes)] == tuple(axes)]
 
 
-def varying_numbers(dataset: xarray.Dataset, axes: Sequence[str], known: Sequence[str]) -> list[str]:
+def varying_numbers(dataset: Data, axes: Sequence[str], known: Sequence[str]) -> list[str]:
     """Return the numbers that differ between runs: of bonds, temperatures and times, else others."""
     found = sorted(known, key=lambda name: next(k for k, rank in enumerate(NAME_ORDER) if re.fullmatch(rank, name)))
-    ends = [name for name in found if dataset[name].ndim == len(axes) and "error" not in name and name not in COUNTED]
+    ends = [name for name in found if len(dataset[name].dims) == len(axes) and not ("error" in name or name in COUNTED)]
     # Fractions, of bonds say, are compared with one: those left of broken bonds are rounding.
     sizes = {name: float(unit(dataset[name]) == "1") for name in ends}
     first: dict[bytes, str] = {}  # of several with the same values, such as a maximum that is the final value
@@ -92,45 +91,45 @@ def varying_numbers(dataset: xarray.Dataset, axes: Sequence[str], known: Sequenc
     return next(filter(None, groups), ["time_reached"])[:MOST_PANELS]
 
 
-def with_final_bonds(dataset: xarray.Dataset, axes: Sequence[str]) -> xarray.Dataset:
+def with_final_bonds(dataset: Data, axes: Sequence[str]) -> Data:
     """Return the dataset with bonds at the end of each run; with all final values if neither bonds nor temperatures
     vary. It is unchanged if it holds such numbers already.
     """
-    series = [name for name in series_names(dataset, axes) if name in dataset.data_vars]
-    if not series or any(str(name).endswith("_last") for name in dataset):
+    series = [name for name in series_names(dataset, axes) if name not in dataset.coords]
+    if not series or any(name.endswith("_last") for name in dataset):
         return dataset
     temperatures, bonds = (of_kind(dataset, series, *kind) for _, *kind in PANELS[:2])
     moving = [name for name in (*bonds, *temperatures) if varies(subsample(dataset, name))]
     last = [name for name in series if not name.endswith(("_exact", "_residual"))] if not moving else bonds
-    ends = {f"{n}_last": xarray.Variable(axes, final_values(dataset, n), dataset[n].attrs) for n in last}
-    return dataset.assign(ends)
+    final = (DataVariable(f"{n}_last", tuple(axes), final_values(dataset, n), dataset[n].attrs) for n in last)
+    return replace(dataset, variables={**dataset.variables, **{each.name: each for each in final}})
 
 
-def final_values(dataset: xarray.Dataset, name: str) -> Array:
+def final_values(dataset: Data, name: str) -> Array:
     """Return the value at the end of each run, or at the last output if that is all there is; NaN if the run failed or
     was refused.
     """
     ended = f"{name}_last"
     values: Array = dataset[ended if ended in dataset else name].values
-    if values.ndim > dataset["status"].ndim:
+    if values.ndim > len(dataset["status"].dims):
         last = values.shape[-1] - 1 - np.argmax(np.isfinite(values)[..., ::-1], axis=-1)
         values = np.take_along_axis(values, last[..., None], axis=-1)[..., 0]
     return np.where(style.has_no_end(dataset, *style.WITHOUT_END), np.nan, values)
 
 
-def ends_are_known(dataset: xarray.Dataset, names: Sequence[str]) -> bool:
+def ends_are_known(dataset: Data, names: Sequence[str]) -> bool:
     """True if the last values are those at the ends of all runs, none of which stopped after its last output."""
     return all(f"{name}_last" in dataset for name in names) or not style.has_no_end(dataset, style.STOPPED).any()
 
 
-def subsample(dataset: xarray.Dataset, name: str) -> Array:
+def subsample(dataset: Data, name: str) -> Array:
     """Return the values of a variable, of an evenly spread subset if there are many runs."""
-    series = dataset[name].ndim > dataset["status"].ndim
+    series = len(dataset[name].dims) > len(dataset["status"].dims)
     values = (dataset[name].values if series else final_values(dataset, name)).ravel()
     return np.asarray(values[:: -(-values.size // MOST_POINTS)], dtype=float)
 
 
-def heat_maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
+def heat_maps(dataset: Data, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
     """Draw colours over two parameters, one map per variable; white where a run has no value."""
     x, y = (dataset[name] for name in axes)
     with style.panels(5.6, 0.6 + 3.3 * len(names), len(names), sharex=True) as (plot, grid):
@@ -146,11 +145,11 @@ def heat_maps(dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], names: S
     return plot
 
 
-def trajectories(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequence[str] | None, against: str) -> Figure:
+def trajectories(dataset: Data, axes: Sequence[str], variables: Sequence[str] | None, against: str) -> Figure:
     """Draw each run of a sweep over one of its variables, or over time."""
     series = series_names(dataset, axes)
     # The dimension along the runs is time or, if a load ends them, the load.
-    inner = [str(dim) for name in series for dim in dataset[name].dims if dim not in axes]
+    inner = [dim for name in series for dim in dataset[name].dims if dim not in axes]
     known = [*series, *dict.fromkeys(inner)]
     asked = (*(variables or ()), against)
     if single := next(filter((dataset.variables.keys() - known).__contains__, asked), ""):
@@ -164,18 +163,18 @@ def trajectories(dataset: xarray.Dataset, axes: Sequence[str], variables: Sequen
     return curves(dataset, axes, names, against)
 
 
-def series_names(dataset: xarray.Dataset, axes: Sequence[str]) -> list[str]:
+def series_names(dataset: Data, axes: Sequence[str]) -> list[str]:
     """Return the names of numbers along the runs of a sweep."""
-    many = [str(n) for n, x in dataset.variables.items() if x.dtype.kind == "f" and x.ndim == len(axes) + 1]
+    many = [n for n, x in dataset.variables.items() if x.kind == "f" and len(x.dims) == len(axes) + 1]
     return [name for name in many if "event" not in dataset[name].dims]
 
 
-def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], against: str | None = None) -> Figure:
+def curves(dataset: Data, axes: Sequence[str], names: Sequence[str], against: str | None = None) -> Figure:
     """Draw series of all runs, or of an evenly spread subset, whose size is noted; over ``against`` instead of time."""
     count = int(np.prod([dataset.sizes[name] for name in axes]))
     members = style.evenly_spread(count, MOST_MEMBERS)
-    over = dataset[against or str(dataset[names[0]].dims[-1])]
-    x = np.broadcast_to(over.values, dataset[names[0]].shape).reshape(count, -1)[members]
+    over = dataset[against or dataset[names[0]].dims[-1]]
+    x = np.broadcast_to(over.values, dataset[names[0]].values.shape).reshape(count, -1)[members]
     with style.panels(6.4, 0.9 + 2.2 * len(names), len(names), sharex=True) as (plot, grid):
         for ax, name in zip(grid[:, 0], names, strict=True):
             values = dataset[name].values.reshape(count, -1)[members]
@@ -198,7 +197,7 @@ def curves(dataset: xarray.Dataset, axes: Sequence[str], names: Sequence[str], a
     return plot
 
 
-def _peaks_between_outputs(dataset: xarray.Dataset, name: str) -> str:
+def _peaks_between_outputs(dataset: Data, name: str) -> str:
     """Describe the largest magnitude of a variable if no output of any run comes near it, as in a brief slip."""
     ends = [dataset[key].values for key in (f"{name}_max", f"{name}_min") if key in dataset]
     reached, shown = max(map(style.largest, ends), default=0.0), style.largest(dataset[name].values)
@@ -208,16 +207,16 @@ def _peaks_between_outputs(dataset: xarray.Dataset, name: str) -> str:
     return style.minus(f"between outputs, {symbol(name)} reaches {reached / size:.3g} {text}")
 
 
-def colours(dataset: xarray.Dataset, axes: Sequence[str]) -> ScalarMappable:
+def colours(dataset: Data, axes: Sequence[str]) -> ScalarMappable:
     """Return the colour map of the values of a parameter."""
     values = dataset[axes[0]].values
     scale = LogNorm if style.over_decades(values) else Normalize
     return ScalarMappable(scale(values.min(), values.max()), "viridis")
 
 
-def line_style(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dict[str, Any]:
+def line_style(dataset: Data, axes: Sequence[str], member: int) -> dict[str, Any]:
     """Return the style of the curve of a run: coloured by its parameter if there is one, with a legend for few runs."""
-    shape = dataset["status"].shape
+    shape = dataset["status"].values.shape
     if RUN_DIMENSION not in axes and np.prod(shape) <= style.MOST_CURVES:
         place = [int(k) for k in np.unravel_index(member, shape)]
         return {"color": COLOURS[member], "linewidth": 1.3, "label": style.member_name(dataset, place)}
@@ -227,9 +226,7 @@ def line_style(dataset: xarray.Dataset, axes: Sequence[str], member: int) -> dic
     return {"color": colours(dataset, axes).to_rgba(value), "linewidth": 0.9}
 
 
-def effects(
-    dataset: xarray.Dataset, plan: Plan, axes: Sequence[str], parameters: Sequence[str], names: Sequence[str]
-) -> Figure:
+def effects(dataset: Data, plan: Plan, axes: Sequence[str], parameters: Sequence[str], names: Sequence[str]) -> Figure:
     """Draw the distribution of each variable, and its median and band over each parameter, for all values of others."""
     drawn = plan.sample.draws if plan.sample else {}
     ratios = {axis.path: axis.logarithmic for axis in plan.axes}
@@ -239,13 +236,13 @@ def effects(
         2.2 + 2.0 * len(parameters), 0.8 + 2.1 * len(names), len(names), 1 + len(parameters), sharey="row"
     ) as (plot, grid):
         for row, name in zip(grid, names, strict=True):
-            whole = dataset[name]
-            values = subsample(dataset, name)
+            whole, values = dataset[name], subsample(dataset, name)
             distribution(row[0], values)
             error = style.error_of(dataset, [name])
             style.label(row[0].yaxis, style.quantity_words(whole), unit(whole), values, error=error)
             for ax, parameter in zip(row[1:], parameters, strict=True):
-                over = dataset[parameter].broadcast_like(whole).transpose(*axes).values.ravel()
+                own = [dataset.sizes[axis] if axis in dataset[parameter].dims else 1 for axis in axes]
+                over = np.broadcast_to(dataset[parameter].values.reshape(own), whole.values.shape).ravel()
                 effect(ax, over[:: -(-over.size // MOST_POINTS)], values)
         for column, parameter in zip(grid.T[1:], parameters, strict=True):
             for ax in column:
@@ -289,9 +286,9 @@ def effect(ax: Axes, over: Array, values: Array) -> None:
     ax.plot(places, middle, color=COLOURS[1], marker="o", markersize=2.5)
 
 
-def load_of(dataset: xarray.Dataset) -> str:
+def load_of(dataset: Data) -> str:
     """Return the load under whose growth the bonds of a sweep rupture; '' for other sweeps."""
-    names = (str(name).removesuffix("_mode") for name in dataset.data_vars if str(name).endswith("_mode"))
+    names = (name.removesuffix("_mode") for name in dataset if name.endswith("_mode"))
     loads = [load for load in names if all(f"{load}_{which}" in dataset for which in STATISTICS)]
     return loads[0] if loads else ""
 
@@ -308,7 +305,7 @@ MOST_LARGE_MARKERS = 30
 """Number of points from which on large markers would hide each other."""
 
 
-def figure_of_rupture(dataset: xarray.Dataset, load: str, variables: Sequence[str] | None = None) -> Figure:
+def figure_of_rupture(dataset: Data, load: str, variables: Sequence[str] | None = None) -> Figure:
     """Draw the spectrum, the distribution p(f) for some runs, and the lifetime; or ``variables`` over the load."""
     series = (f"density_{load}", "lifetime")
     held = all(name in dataset and load in dataset[name].dims for name in series)  # a store may keep no series
@@ -334,7 +331,7 @@ def figure_of_rupture(dataset: xarray.Dataset, load: str, variables: Sequence[st
     return plot
 
 
-def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], str]]:
+def _members(dataset: Data, load: str) -> list[tuple[tuple[int, ...], str]]:
     """Return indices and names of some runs, evenly spread over those whose most probable load is positive."""
     modes = dataset[f"{load}_mode"].values
     # At low loading rates most bonds break before the load grows, and their peak at zero would dwarf all others.
@@ -344,12 +341,11 @@ def _members(dataset: xarray.Dataset, load: str) -> list[tuple[tuple[int, ...], 
     return [(tuple(at), style.member_name(dataset, at)) for at in chosen.tolist()]
 
 
-def _draw_over(
-    ax: Axes, dataset: xarray.Dataset, load: str, values: Array, scale: Callable[[Array], Array] = np.asarray
-) -> None:
+def _draw_over(ax: Axes, dataset: Data, load: str, values: Array, scale: Callable[[Array], Array] = np.asarray) -> None:
     """Draw values of some runs over the load; as one curve if they coincide on this scale."""
     members = _members(dataset, load)
-    notes = [f"{len(members)} of {dataset['status'].size} runs"] if len(members) < dataset["status"].size else []
+    count = dataset["status"].values.size
+    notes = [f"{len(members)} of {count} runs"] if len(members) < count else []
     shown = np.array([values[place] for place, _ in members])
     if len(members) > 1 and _coincide(scale(shown)):
         ax.plot(dataset[load].values, np.fmin.reduce(shown), color="black", linewidth=LINE_WIDTH)
@@ -368,7 +364,7 @@ def _coincide(curves: Array) -> bool:
     return bool(apart * 72 * PANEL_HEIGHT <= LINE_WIDTH * range_)
 
 
-def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> None:
+def _draw_series(ax: Axes, dataset: Data, load: str, name: str) -> None:
     """Draw a variable over the load; the distribution of the load at rupture is drawn until all bonds are broken."""
     values = dataset[name].values
     if name == f"density_{load}":
@@ -384,13 +380,14 @@ def _draw_series(ax: Axes, dataset: xarray.Dataset, load: str, name: str) -> Non
         style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
 
 
-def _draw_statistics(ax: Axes, dataset: xarray.Dataset, words: Mapping[str, str], size: float) -> None:
+def _draw_statistics(ax: Axes, dataset: Data, words: Mapping[str, str], size: float) -> None:
     """Draw results of each run over the swept parameter, by name with their labels in the legend, in one colour for
     each or for each value of a second parameter; exact values as black dots, as they are known at these points only.
     """
-    parameter = dataset[str(dataset["status"].dims[0])]
+    parameter = dataset[dataset["status"].dims[0]]
     style.draw_parameter(ax.xaxis, parameter)
-    x, large = parameter.values, 3.5 if len(parameter) < MOST_LARGE_MARKERS else 2.0
+    x = parameter.values
+    large = 3.5 if len(x) < MOST_LARGE_MARKERS else 2.0
     seconds = [label for _, label in style.curves_by_second(dataset, dataset[next(iter(words))].values)]
     for name, marker, own in zip(words, MARKERS, COLOURS, strict=False):
         for (values, _), colour in zip(
@@ -404,15 +401,15 @@ def _draw_statistics(ax: Axes, dataset: xarray.Dataset, words: Mapping[str, str]
     _draw_exact(ax, dataset, [f"{name}_exact" for name in words if f"{name}_exact" in dataset], size, large / 3)
 
 
-def _draw_exact(ax: Axes, dataset: xarray.Dataset, names: Sequence[str], size: float, width: float) -> None:
+def _draw_exact(ax: Axes, dataset: Data, names: Sequence[str], size: float, width: float) -> None:
     """Draw exact results of each run as black dots of a width [pt], on the points of the runs."""
-    x = dataset[str(dataset["status"].dims[0])].values
+    x = dataset[dataset["status"].dims[0]].values
     found = [values for name in names for values, _ in style.curves_by_second(dataset, final_values(dataset, name))]
     for j, values in enumerate(found):
         ax.plot(x, values / size, "o", color="black", markersize=width, label="_" if j else "exact")
 
 
-def lifetimes(dataset: xarray.Dataset) -> Figure:
+def lifetimes(dataset: Data) -> Figure:
     """Draw the lifetime over the swept parameter, the exact one as dots, and the survival over time of some runs."""
     with style.panels(6.4, 5.3, 2) as (plot, grid):
         above, below = grid[:, 0]
@@ -426,7 +423,7 @@ def lifetimes(dataset: xarray.Dataset) -> Figure:
     return plot
 
 
-def _draw_survival(ax: Axes, dataset: xarray.Dataset) -> None:
+def _draw_survival(ax: Axes, dataset: Data) -> None:
     """Draw the survival over time of runs evenly spread over those with a known lifetime."""
     known = np.argwhere(np.isfinite(dataset["lifetime"].values))
     chosen = style.evenly_spread(len(known), MOST_CURVES)
@@ -449,7 +446,7 @@ def _draw_survival(ax: Axes, dataset: xarray.Dataset) -> None:
 MOST_DRAWN = 2
 
 
-def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
+def figure(dataset: Data, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
     """Draw a sweep: the load at rupture, else final values; with ``against`` each run over this variable."""
     plan, axes = plan_of(dataset), axes_of(dataset)
     if against:
@@ -466,7 +463,7 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
     return _final_values(dataset, axes[0], shown)
 
 
-def _final_values(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) -> Figure:
+def _final_values(dataset: Data, axis: str, shown: Sequence[Panel]) -> Figure:
     """Draw values at the ends of the runs over the first parameter, in panels."""
     height = 0.9 + (2.8 if len(shown) == 1 else 1.7) * len(shown)
     with style.panels(6.4, height, len(shown), sharex=True) as (plot, grid):
@@ -478,7 +475,7 @@ def _final_values(dataset: xarray.Dataset, axis: str, shown: Sequence[Panel]) ->
     return plot
 
 
-def plan_of(dataset: xarray.Dataset) -> Plan:
+def plan_of(dataset: Data) -> Plan:
     """Return the plan of the sweep that a dataset records; InputError if it does not hold its parameters."""
     axes = axes_of(dataset)
     style.check_variables(dataset, {}, {"status": tuple(axes)})
@@ -489,25 +486,25 @@ def plan_of(dataset: xarray.Dataset) -> Plan:
     return plan
 
 
-def hides_runs(dataset: xarray.Dataset, axes: Sequence[str]) -> bool:
+def hides_runs(dataset: Data, axes: Sequence[str]) -> bool:
     """True if curves over the first parameter, one for each value of a second one, cannot show the runs."""
-    spectral = any(str(name).endswith("_mode") for name in dataset)
+    spectral = any(name.endswith("_mode") for name in dataset)
     curves = len(axes) == MOST_DRAWN and dataset.sizes[axes[1]] > MOST_CURVES
     return not spectral and (RUN_DIMENSION in axes or len(axes) > MOST_DRAWN or curves)
 
 
-def axes_of(dataset: xarray.Dataset) -> list[str]:
+def axes_of(dataset: Data) -> list[str]:
     """Return the dimensions of the swept parameters."""
-    return [str(name) for name in dataset["status"].dims] if "status" in dataset else []
+    return [*dataset["status"].dims] if "status" in dataset else []
 
 
-def _numbers(dataset: xarray.Dataset) -> list[str]:
+def _numbers(dataset: Data) -> list[str]:
     """Return the names of variables that curves over the swept parameter show; coverages also have their own names."""
     lists = {"event", "species"}
     return [name for name in number_names(dataset, axes_of(dataset)) if lists.isdisjoint(dataset[name].dims)]
 
 
-def panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Panel]:
+def panels(dataset: Data, variables: Sequence[str] | None) -> list[Panel]:
     """Return panels of the variables, else of the most probable load at rupture, else of those that vary."""
     known, load = _numbers(dataset), load_of(dataset)
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
@@ -517,21 +514,21 @@ def panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Pan
     return [Panel("", unit(dataset[group[0]]), group) for group in names]
 
 
-def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
+def _dependent(dataset: Data) -> list[list[str]]:
     """Return temperatures and bonds whose final values depend on the sweep; with several parameters one per panel."""
     axes, found = axes_of(dataset), []
-    along = [name for name in _numbers(dataset) if dataset[name].ndim > len(axes)]
+    along = [name for name in _numbers(dataset) if len(dataset[name].dims) > len(axes)]
     for _, *kind in PANELS[:2]:
         names = [name for name in of_kind(dataset, along, *kind) if varies(final_values(dataset, name).ravel())]
         found += [[name] for name in names] if len(axes) > 1 else [names] if names else []
     return found
 
 
-def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
+def _draw_final(ax: Axes, dataset: Data, names: Sequence[str]) -> None:
     """Draw the values at the end of each run."""
     x = dataset[axes_of(dataset)[0]].values
     ends = {name: final_values(dataset, name) for name in names}
-    at_end = any(dataset[name].ndim > len(axes_of(dataset)) for name in names)
+    at_end = any(len(dataset[name].dims) > len(axes_of(dataset)) for name in names)
     for name, end in ends.items():
         own = symbol(name) if at_end or len(names) > 1 else ""  # the axis names a single number per run
         for values, label in style.curves_by_second(dataset, end):

@@ -15,13 +15,13 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.plots import curved, style
 from surfacechem.plots.style import Array, meaning, symbol, unit, varies
+from surfacechem.results.netcdf import Data
 from surfacechem.tolerances import EPS, RUN_EPS
 
 # Panels of the default figure: title, and patterns of the unit and of the names.
@@ -116,7 +116,7 @@ class Panel:
     names: Sequence[str]
 
 
-def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
+def figure(dataset: Data, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
     """Draw a run; ``variables`` are shown instead of the default choice, over ``against`` instead of time."""
     style.check_variables(dataset, {"time": ("time",)})
     if not np.isfinite(dataset["time"].values).all():
@@ -135,15 +135,13 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
     return _stacked(dataset, shown, against, balances, below)
 
 
-def _balances_err(dataset: xarray.Dataset) -> bool:
+def _balances_err(dataset: Data) -> bool:
     """True if a balance closes to less than the last digit, or if its largest residual is unknown."""
     largest = [style.attribute(dataset, error) for name, error in RESIDUALS.items() if name in dataset]
     return any(error is None or not error < ROUNDED_RESIDUAL for error in largest)
 
 
-def _stacked(
-    dataset: xarray.Dataset, shown: Sequence[Panel], against: str | None, balances: bool, below: int
-) -> Figure:
+def _stacked(dataset: Data, shown: Sequence[Panel], against: str | None, balances: bool, below: int) -> Figure:
     """Draw panels that share an axis, the balances, and rows of surfaces below, if any."""
     rows = len(shown) + balances
     height = 0.9 + (2.6 if against else 1.55) * rows + curved.HEIGHT * below
@@ -161,7 +159,7 @@ def _stacked(
     return plot
 
 
-def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> Figure:
+def at_states(dataset: Data, variables: Sequence[str] | None, against: str | None) -> Figure:
     """Draw variables at given states, by default tractions and heat fluxes that differ, over ``against``, by default
     the first quantity that differs.
     """
@@ -187,12 +185,12 @@ def at_states(dataset: xarray.Dataset, variables: Sequence[str] | None, against:
     return plot
 
 
-def _usual_at_states(dataset: xarray.Dataset, names: Sequence[str]) -> Sequence[str]:
+def _usual_at_states(dataset: Data, names: Sequence[str]) -> Sequence[str]:
     """Return the tractions and heat fluxes among the names; without any the first names."""
     return ([name for name in names if unit(dataset[name]) in UNITS_AT_STATES] or names)[:MOST_PANELS_AT_STATES]
 
 
-def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | None:
+def first_shown(dataset: Data, panels: Sequence[Panel]) -> float | None:
     """Return the time at which a logarithmic axis begins; None if a linear one is sufficient for the panels."""
     times = dataset["time"].values
     # Fluxes follow from changes of states: their initial values are no reason for a logarithmic axis.
@@ -200,27 +198,23 @@ def first_shown(dataset: xarray.Dataset, panels: Sequence[Panel]) -> float | Non
     moments = np.array([t for t, _ in _event_times(dataset)])
     late = int(np.sum(moments > times[-1] / 10))
     crowded = late >= MOST_IN_LAST_DECADE and 2 * late > len(moments) and not wants_log_axis(times)
-    if crowded or not wants_log_axis(times, [dataset.variables[name].values for name in names]):
+    if crowded or not wants_log_axis(times, [dataset[name].values for name in names]):
         return None
     return float(max(times[times > 0][0], LOG_AXIS_PART * times[-1]))
 
 
-def curves(dataset: xarray.Dataset, over: str = "time") -> list[str]:
+def curves(dataset: Data, over: str = "time") -> list[str]:
     """Return the names of numbers that are functions of time, or of another dimension, only."""
-    # Variables themselves: arrays with coordinates take a time that grows with the number of variables, each.
-    found = ((str(name), dataset.variables[name]) for name in dataset.data_vars)
-    return [name for name, values in found if values.dims == (over,) and values.dtype.kind == "f"]
+    return [name for name in dataset if dataset[name].dims == (over,) and dataset[name].kind == "f"]
 
 
-def of_kind(dataset: xarray.Dataset, names: Sequence[str], units: str, pattern: str) -> list[str]:
+def of_kind(dataset: Data, names: Sequence[str], units: str, pattern: str) -> list[str]:
     """Return the names that a panel of the default figure shows; modes are shown as bands, exact values dashed."""
-    fitting = [
-        name for name in names if re.fullmatch(units, unit(dataset.variables[name])) and re.fullmatch(pattern, name)
-    ]
-    return [name for name in fitting if not (name.endswith("_exact") or style.is_mode(dataset.variables[name]))]
+    fitting = [name for name in names if re.fullmatch(units, unit(dataset[name])) and re.fullmatch(pattern, name)]
+    return [name for name in fitting if not (name.endswith("_exact") or style.is_mode(dataset[name]))]
 
 
-def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> list[Panel]:
+def panels(dataset: Data, variables: Sequence[str] | None, against: str | None) -> list[Panel]:
     """Return panels of the variables by unit, or of all that vary by kind, without the variable of the axis."""
     known = curves(dataset)
     asked = (*(variables or ()), *filter(None, [against]))
@@ -228,14 +222,14 @@ def panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: st
     shown, found = [name for name in dict.fromkeys(variables or known) if name != against], []
     if not variables:
         return _by_kind(dataset, shown)
-    for wanted in dict.fromkeys(unit(dataset.variables[name]) for name in shown):
-        group = [name for name in shown if unit(dataset.variables[name]) == wanted]
+    for wanted in dict.fromkeys(unit(dataset[name]) for name in shown):
+        group = [name for name in shown if unit(dataset[name]) == wanted]
         title = meaning(dataset[group[0]]) if len(group) == 1 else ""
         found.append(Panel(title if len(title) < MOST_TITLE_LETTERS else "", wanted, group))
     return found
 
 
-def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
+def _by_kind(dataset: Data, known: Sequence[str]) -> list[Panel]:
     panels = []
     for title, units, pattern in PANELS:
         names = of_kind(dataset, known, units, pattern)
@@ -245,29 +239,27 @@ def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
             title = "Coverage"
         # A quantity below the last digit of another one of its unit is rounding.
         sizes = {
-            name: style.largest(dataset.variables[name].values)
-            for name in known
-            if re.fullmatch(units, unit(dataset.variables[name]))
+            name: style.largest(dataset[name].values) for name in known if re.fullmatch(units, unit(dataset[name]))
         }
         felt = EPS * max(sizes.values(), default=0.0)
-        if any(varies(dataset.variables[name].values) and sizes[name] > felt for name in names):
-            panels.append(Panel(title, unit(dataset.variables[names[0]]), names))
+        if any(varies(dataset[name].values) and sizes[name] > felt for name in names):
+            panels.append(Panel(title, unit(dataset[names[0]]), names))
     return panels
 
 
-def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
+def _across(dataset: Data, names: Sequence[str]) -> Figure:
     """Draw temperatures across bodies at several times, with the contact in the middle."""
     for name in names:
         if not PROFILE.fullmatch(name) or name not in dataset:
             raise InputError(f"{name} goes over time, a profile over places; show them in figures of their own.")
     shown = style.evenly_spread(dataset.sizes["time"], PROFILE_TIMES)
-    shown_unit = style.unit_text(unit(dataset[names[0]]))
+    times, shown_unit = dataset["time"].values, style.unit_text(unit(dataset[names[0]]))
     with style.panels(6.4, 3.4) as (plot, ((ax,),)):
         for j, i in enumerate(shown):
             colour = matplotlib.colormaps["viridis"](j / max(len(shown) - 1, 1) * 0.9)
             for name in names:
                 side = -1e3 if name == "profile_1" else 1e3  # [mm]
-                label = f"{float(dataset.time[i]):.3g} s" if name == names[0] else None
+                label = f"{times[i]:.3g} s" if name == names[0] else None
                 ax.plot(side * dataset[f"x_{name[-1]}"].values, dataset[name].values[i], color=colour, label=label)
         ax.set(xlabel="Distance from the contact [mm], body 1 to the left", ylabel=f"Temperature [{shown_unit}]")
         style.legend(ax)
@@ -275,7 +267,7 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
     return plot
 
 
-def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: float | None) -> None:
+def _draw(ax: Axes, dataset: Data, panel: Panel, over: str, first: float | None) -> None:
     """Draw the curves of a panel, with the unit that suits their visible part from ``first`` on."""
     t = dataset[over].values
     _draw_curves(ax, dataset, panel, over)
@@ -289,13 +281,13 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str, first: flo
     style.legend(ax)
 
 
-def _finite_values(dataset: xarray.Dataset, panel: Panel, rows: Any = slice(None)) -> Array:
+def _finite_values(dataset: Data, panel: Panel, rows: Any = slice(None)) -> Array:
     """Return the finite values that a panel shows, at some of its points."""
-    values = np.concatenate([dataset.variables[name].values[rows] for name in panel.names])
+    values = np.concatenate([dataset[name].values[rows] for name in panel.names])
     return np.asarray(values[np.isfinite(values)])
 
 
-def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> float:
+def _show_behind_spike(ax: Axes, dataset: Data, panel: Panel) -> float:
     """Limit a panel of fluxes to their range after an initial spike that would hide all else, and note the size of the
     spike; return the time at which that range begins, 0 without a spike.
     """
@@ -312,35 +304,33 @@ def _show_behind_spike(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> float
     return start
 
 
-def _draw_curves(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
+def _draw_curves(ax: Axes, dataset: Data, panel: Panel, over: str) -> None:
     """Draw the curves of a panel, and the exact ones; of many the largest in colours and the rest in grey."""
     groups, marker = group_coinciding(dataset, panel.names), "o" if dataset.sizes["time"] == 1 else ""
     rest: list[list[str]] = []
     if len(groups) > len(style.COLOURS):
         # Curves of traces cannot be distinguished next to large ones and need no colours.
-        groups.sort(key=lambda names: -style.largest(dataset.variables[names[0]].values))
+        groups.sort(key=lambda names: -style.largest(dataset[names[0]].values))
         groups, rest = groups[:MOST_COLOURED], groups[MOST_COLOURED:]
     for names in groups:
         label = " = ".join([*map(symbol, names[:MOST_NAMES]), *(["..."] if len(names) > MOST_NAMES else [])])
-        drawstyle = style.drawn_as(dataset.variables[names[0]])
-        style.draw_curve(
-            ax, dataset, over, dataset.variables[names[0]].values, label=label, marker=marker, drawstyle=drawstyle
-        )
+        drawstyle = style.drawn_as(dataset[names[0]])
+        style.draw_curve(ax, dataset, over, dataset[names[0]].values, label=label, marker=marker, drawstyle=drawstyle)
     for k, names in enumerate(rest):
         label = "_" if k else f"{len(rest)} smaller"
         kw = {"label": label, "marker": marker, "color": "0.75", "linewidth": 0.8, "zorder": 1}
-        style.draw_curve(ax, dataset, over, dataset.variables[names[0]].values, **kw)
+        style.draw_curve(ax, dataset, over, dataset[names[0]].values, **kw)
     exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in dataset]
     for k, name in enumerate(exact):
         kw = {"label": "_" if k else "exact", "linestyle": DASHES, "color": "black", "linewidth": 0.9}
-        style.draw_curve(ax, dataset, over, dataset.variables[name].values, **kw)
+        style.draw_curve(ax, dataset, over, dataset[name].values, **kw)
 
 
-def group_coinciding(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:
+def group_coinciding(dataset: Data, names: Sequence[str]) -> list[list[str]]:
     """Group names whose curves coincide, so that none hides another."""
     groups: list[tuple[Array, list[str]]] = []
     for name in names:
-        values = dataset.variables[name].values
+        values = dataset[name].values
         twin = next((g for first, g in groups if np.allclose(first, values, rtol=style.FLAT, atol=0.0)), None)
         if twin is None:
             groups.append((values, [name]))
@@ -349,7 +339,7 @@ def group_coinciding(dataset: xarray.Dataset, names: Sequence[str]) -> list[list
     return [group for _, group in groups]
 
 
-def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
+def _draw_balances(ax: Axes, dataset: Data) -> None:
     """Draw residuals, scaled such that the largest is the relative value in their attributes."""
     known = curves(dataset)
     for name in (name for name in RESIDUALS if name in known):
@@ -363,9 +353,7 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
     style.legend(ax)
 
 
-def _draw_axis(
-    axes: Sequence[Axes], dataset: xarray.Dataset, against: str | None, first: float | None
-) -> tuple[float, str]:
+def _draw_axis(axes: Sequence[Axes], dataset: Data, against: str | None, first: float | None) -> tuple[float, str]:
     """Draw the shared axis with bands of modes and lines at events: a variable, or time, logarithmic from ``first`` on.
 
     Return the height in points that names need above the panels, and a text on the events that have none there.
@@ -398,14 +386,14 @@ def label_time(axes: Sequence[Axes], times: Array, unit: str, first: float | Non
         ax.set_xlim(first, float(times.max()))
 
 
-def _event_times(dataset: xarray.Dataset) -> list[tuple[float, str]]:
+def _event_times(dataset: Data) -> list[tuple[float, str]]:
     """Return times and names of the events; the reason replaces the name if that is the variable that passes zero."""
     if "event_time" not in dataset:
         return []
     named = {name: ("event",) for name in ("event_name", "event_reason") if name in dataset}
     style.check_variables(dataset, {"event_time": ("event",)}, named)
     texts = [dataset[name].values.astype(str).tolist() for name in named] or [[""] * dataset.sizes["event"]]
-    quantities = [name for name in curves(dataset) if not style.is_mode(dataset.variables[name])]
+    quantities = [name for name in curves(dataset) if not style.is_mode(dataset[name])]
     events = zip(dataset["event_time"].values.tolist(), texts[0], texts[-1], strict=True)
     return [(t, why if name.partition(" ")[0] in quantities else name) for t, name, why in events]
 
@@ -475,11 +463,11 @@ def _most_frequent(names: Sequence[str], lines: Mapping[str, str]) -> str:
     return ", ".join(f"{f'{count} ' if count > 1 else ''}{name}{kinds.get(name, '')}" for name, count in counts)
 
 
-def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[float, str]]:
+def _draw_bands(axes: Sequence[Axes], dataset: Data) -> list[tuple[float, str]]:
     """Draw bands: every other stage of a programme, with middles and names of all as the result; else the times in
     which a mode differs from its initial value.
     """
-    modes = [name for name in curves(dataset) if style.is_mode(dataset.variables[name])]
+    modes = [name for name in curves(dataset) if style.is_mode(dataset[name])]
     staged, named = "stage" in modes, []
     for name in ["stage"] if staged else modes:
         spans = _mode_spans(dataset, name)
@@ -491,7 +479,7 @@ def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> list[tuple[flo
     return named
 
 
-def _mode_spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float]]:
+def _mode_spans(dataset: Data, name: str) -> list[tuple[float, float, float]]:
     """Return start, end and value of a mode between events; changes between two outputs are too brief to be visible."""
     times, values = dataset["time"].values, dataset[name].values.astype(float)
     known = dataset["event_time"].values if "event_time" in dataset else np.empty(0)

@@ -10,15 +10,18 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from functools import cache
+from dataclasses import dataclass, field
+from functools import cache, cached_property
 from importlib.metadata import version
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, OutputError, Place, PlacedError, nearest
 
@@ -86,6 +89,65 @@ class Column(NamedTuple):
         result["long_name"] = self.long_name
         told = {} if self.error is None else {"error": self.error}
         return result | ({"equation": self.tag} if self.tag else {}) | told
+
+
+@dataclass(frozen=True, eq=False)
+class DataVariable:
+    """A variable of a dataset, as xarray names its parts."""
+
+    name: str
+    dims: tuple[str, ...]
+    source: Any
+    """The values, or what reads them when they are asked for."""
+    attrs: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def values(self) -> NDArray[Any]:
+        """The values, shape as ``dims``."""
+        return np.asarray(self.source)
+
+    @property
+    def kind(self) -> str:
+        """Kind of the values, as NumPy names it; known without reading them."""
+        return str(self.source.dtype.kind)
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """A dataset for figures and reports: of a file, a store or an xarray Dataset, without the imports of the latter,
+    which take as long as a figure. It iterates over the names of variables that are no coordinates.
+    """
+
+    variables: Mapping[str, DataVariable]
+    attrs: Mapping[str, Any] = field(default_factory=dict)
+    coords: Collection[str] = ()
+    """Names of the coordinates."""
+    file: str = ""
+
+    @classmethod
+    def of(cls, dataset: xarray.Dataset) -> Data:
+        """Return the variables of an xarray Dataset; values are read when they are asked for."""
+        parts = {str(name): (str(name), tuple(map(str, v.dims)), v, v.attrs) for name, v in dataset.variables.items()}
+        variables = {name: DataVariable(*part) for name, part in parts.items()}
+        return cls(variables, dataset.attrs, {*map(str, dataset.coords)}, str(dataset.encoding.get("source", "")))
+
+    @cached_property
+    def sizes(self) -> dict[str, int]:
+        """Length of each dimension."""
+        pairs = (zip(each.dims, each.source.shape, strict=True) for each in self.variables.values())
+        return dict(chain.from_iterable(pairs))
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of variables that are no coordinates."""
+        return (name for name in self.variables if name not in self.coords)
+
+    def __contains__(self, name: str) -> bool:
+        """True if there is a variable or a coordinate of this name."""
+        return name in self.variables
+
+    def __getitem__(self, name: str) -> DataVariable:
+        """Return a variable or a coordinate."""
+        return self.variables[name]
 
 
 @cache
@@ -248,28 +310,23 @@ def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str,
         raise OSError(str(error)) from error
 
 
-def read_netcdf(path: Path) -> xarray.Dataset:
+def read_netcdf(path: Path) -> Data:
     """Read the whole dataset of a file as it is written; OSError if it cannot be read."""
     import netCDF4
-    import xarray
 
     def attributes(item: Any) -> dict[str, Any]:
         return {name: item.getncattr(name) for name in item.ncattrs()}
 
-    # xarray.open_dataset, indexes and checks of arrays import Dask and Pint if installed, which takes a second.
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
-        found = {
-            name: xarray.Variable(item.dimensions, np.asarray(item[...]), attributes(item), fastpath=True)
+        variables = {
+            name: DataVariable(name, item.dimensions, np.asarray(item[...]), attributes(item))
             for name, item in file.variables.items()
         }
         whole = attributes(file)
-        said = str(whole.pop(COORDINATES, "")).split()
-        names = [name for name in found if found[name].dims == (name,) or name in said]
-        coordinates = {name: found.pop(name) for name in names}
-        dataset = xarray.Dataset(found, xarray.Coordinates(coordinates, indexes={}), whole)
-    dataset.encoding["source"] = str(path)
-    return dataset
+    said = str(whole.pop(COORDINATES, "")).split()
+    coordinates = frozenset(name for name, item in variables.items() if item.dims == (name,) or name in said)
+    return Data(variables, whole, coordinates, str(path))
 
 
 def save_kept(dataset: xarray.Dataset, target: Path) -> Path:

@@ -347,7 +347,7 @@ class Study:
         matplotlib.figure.Figure
             The figure.
         """
-        from surfacechem.plots.study import figure
+        from surfacechem.plots import figure
 
         return figure(self.dataset)
 

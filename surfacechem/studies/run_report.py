@@ -27,6 +27,7 @@ from surfacechem.model.system import System
 from surfacechem.plots import drawing, figure, opened, save
 from surfacechem.results import spatial
 from surfacechem.results.dataset import Results, changes_of
+from surfacechem.results.netcdf import Data
 from surfacechem.results.solution import Solution
 from surfacechem.runs.check import laws_of
 from surfacechem.runs.listing import FORMULA, Sheet, plain, source
@@ -74,7 +75,7 @@ def page(data: xarray.Dataset | str | Path) -> Page:
     except InputError as error:  # a report does not execute code that the dataset carries
         sections += [*_events(dataset), _balances(attributes)]
         omissions.append(f"The scene and its equations: {error.message}")
-    untitled = dataset.assign_attrs(title="")  # the page has the title above
+    untitled = replace(dataset, attrs={**attributes, "title": ""})  # the page has the title above
     told_again = [again, *([f"$ {command}"] if command else []), *changed]
     sections.append(PageSection("How to run it again", told_again, code=attributes["case"], details=True))
     return Page(attributes.get("title", "untitled"), command, sections, omissions, lambda: figure(untitled))
@@ -203,9 +204,9 @@ def _stated(law: type[Law]) -> Iterator[Equation]:
         yield Equation("", tuple(pieces), f"{law.contract}: {name}", source(law))
 
 
-def _events(dataset: xarray.Dataset) -> list[PageSection]:
+def _events(dataset: Data) -> list[PageSection]:
     """Return the section on the events of a run with their verdicts."""
-    if "event_time" not in dataset or dataset["event_time"].ndim != 1:
+    if "event_time" not in dataset or len(dataset["event_time"].dims) != 1:
         return []
     names = [name for name in ("event_name", "event_reason", "event_verdict") if name in dataset]
     columns = [dataset[name].values.tolist() for name in names]

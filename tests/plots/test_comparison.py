@@ -6,7 +6,7 @@ import xarray
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.plots import COLOURS, figure
+from surfacechem.plots import COLOURS, figure, opened
 from surfacechem.plots.comparison import labels
 
 pytestmark = pytest.mark.around
@@ -48,7 +48,7 @@ def test_runs_have_colours_and_variables_have_dashes(runs):
 def test_sweeps_over_the_same_parameter_are_compared(sweeps, runs):
     (ax,) = figure(sweeps, ["T_1"]).axes
     assert [line.get_ydata()[1] for line in ax.get_lines()] == [each["T_1"].values[1, -1] for each in sweeps]
-    assert labels(sweeps) == ["until = 200 s", "until = 10 s"]
+    assert labels([*map(opened, sweeps)]) == ["until = 200 s", "until = 10 s"]
     several = sweeps[0].expand_dims(mu=[0.1, 0.2], axis=1)
     with pytest.raises(InputError, match="all are over one parameter, the same; these are over initial_T_1 by mu"):
         figure([several, several])
@@ -59,15 +59,15 @@ def test_sweeps_over_the_same_parameter_are_compared(sweeps, runs):
 def test_changes_made_in_python_have_units_and_the_names_of_the_case():
     case = surfacechem.load("sliding-dry")
     changed = case.run({"loading.p": 2e5, "interface.friction.coulomb.mu": 0.6})
-    names = labels([case.run().dataset, changed.dataset])
+    names = labels([opened(case.run().dataset), opened(changed.dataset)])
     assert names == ["$\\mu$ = 0.3, $p$ = 100 kPa", "$\\mu$ = 0.6, $p$ = 200 kPa"]
 
 
 def test_datasets_that_differ_in_all_are_named_by_title_or_file(runs, tmp_path):
     solution = surfacechem.run("pair-exchange")
     other = solution.dataset
-    assert labels([runs[0], other]) == ["A body cools to a reservoir", "Two bodies exchange heat"]
-    assert labels([runs[0], runs[0]]) == ["dataset 1", "dataset 2"]
+    assert labels([opened(runs[0]), opened(other)]) == ["A body cools to a reservoir", "Two bodies exchange heat"]
+    assert labels([opened(runs[0])] * 2) == ["dataset 1", "dataset 2"]
     solution.write(tmp_path / "pair.nc")
     with pytest.raises(InputError, match=r"pair\.nc: no variable 'lost_1'"):
         figure([runs[0].assign(lost_1=runs[0]["T_1"]), tmp_path / "pair.nc"], ["lost_1"])
