@@ -650,7 +650,8 @@ class Shape(Law):
         return [value for value in given if value is not None]
 
     foot: ClassVar[Callable[..., Any] | None] = None
-    """Parameters (..., 2) of the nearest point to each of the points (..., 3), if there is a closed form."""
+    """Parameters (..., 2) of the nearest point to each of the points (..., 3), if there is a closed form; one beyond
+    the bounds is moved to the edge."""
     starts: ClassVar[Callable[..., tuple[Any, Any]]]
     """Without a closed form, starts of searches for the nearest point: indices (m,) of the points (n, 3), in order and
     one or more for each, and the parameters (m, 2) at which the searches begin."""

@@ -576,11 +576,6 @@ class System:
         """True if the total energy depends explicitly on time, as under a prescribed load."""
         return self.t in self.definitions[symengine.Symbol("E_total")].free_symbols
 
-    @cached_property
-    def paths_by_symbol(self) -> dict[str, str]:
-        """Paths of the parameters, by the names of their symbols."""
-        return {str(parameter.symbol): parameter.path for parameter in self.parameters}
-
     def reason(self, margin: Margin, inputs: Array) -> str:
         """Return the reason, in words, why a margin closed; ``inputs`` are those of compiled functions there."""
         if margin.below is None:

@@ -60,8 +60,10 @@ class SceneView:
     def read(self, reading: str, name: str) -> float | None:
         """Return one of the readings above or below, by name if it needs one; a preceding minus reverses the sign."""
         own = name.removeprefix("-")
-        if reading in LAWS:
-            value = self._constant(reading, own)
+        if reading in LAWS:  # of one of the laws, or of a factor of one of its parameters
+            paths = (f"{owner}.{own}" for owner in self.scene.interface.owners[reading])
+            given = [self.run.values[path] for path in paths if path in self.run.values]
+            value = given[0] if len(given) == 1 else None
         elif reading in PATHS:
             value = self.run.values.get(PATHS[reading].format(own))
         else:
@@ -70,12 +72,6 @@ class SceneView:
         return -value if value is not None and name.startswith("-") else value
 
     # -- laws, loads, supports -----------------------------------------------------------------------------------------
-
-    def _constant(self, kind: str, name: str) -> float | None:
-        """Return a constant of one of the laws, or of a factor of one of its parameters."""
-        values, owners = self.run.values, self.scene.interface.owners[kind]
-        found = [values[path] for owner in owners if (path := f"{owner}.{name}") in values]
-        return found[0] if len(found) == 1 else None
 
     def surface(self, name: str) -> float | None:
         """Return a parameter of the shapes of two bodies, or of a law between them."""
@@ -113,8 +109,8 @@ class SceneView:
 
     def constant(self, name: str) -> float | None:
         """Return a constant of bodies or sites by its symbol: C_1, C_2, C_c, T_0, N_c, N_1, N_2, thickness_1, ..."""
-        path = self._system.paths_by_symbol.get(name)
-        return None if path is None else self.run.values[path]
+        paths = (item.path for item in self._system.parameters if str(item.symbol) == name)
+        return next((self.run.values[path] for path in paths), None)
 
     @property
     def capacity(self) -> float:

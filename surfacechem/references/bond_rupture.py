@@ -42,8 +42,8 @@ class BellConstantForce(BellBond):
     Source: Bell (1978), Science 200, 618-627, doi 10.1126/science.347575.
 
     >>> bond = BellConstantForce(k_off=0.1, x_off=4e-10, T=300.0, f=3e-11)
-    >>> f"{bond.solution(1.37945379273430010)['phi']:.12f}, {bond.half_life:.6f} s"
-    '0.082084998624, 0.382466 s'
+    >>> f"{bond.solution(1.37945379273430010)['phi']:.12f}, {bond.lifetime:.6f} s"
+    '0.082084998624, 0.551782 s'
     """
 
     f: float = parameter("N", "force per bond")
@@ -60,11 +60,6 @@ class BellConstantForce(BellBond):
     def lifetime(self) -> float:
         """Mean time [s] to rupture, 1/k; zero below 1e-323 s."""
         return math.exp(-max(self.log_rate, -700.0))
-
-    @property
-    def half_life(self) -> float:
-        """Time [s] in which half of the bonds break; zero below 1e-323 s."""
-        return math.log(2.0) * self.lifetime
 
     def quantities(self, t: Array) -> Quantities:
         broken = np.exp(np.log(t) + self.log_rate)

@@ -92,16 +92,13 @@ class Bonding(PerfectContact):
         taken = Fraction(self.K_2) * (1 - Fraction(self.phi_i)) ** 2
         return float(1 - taken / (Fraction(self.T_0) * self.exact_capacity))
 
-    def unbonded_squared(self, t: Array) -> tuple[Array, Array]:
-        """Return the square x of the unbonded fraction, and its decrease, accurate to rounding at any time."""
-        initial = (1.0 - self.phi_i) ** 2
-        return initial * np.exp(-2.0 * t / self.tau), -initial * np.expm1(-2.0 * t / self.tau)
-
     def heated(self, t: Array) -> tuple[Array, Array, Array, Array]:
         """Return the square x of the unbonded fraction, temperature, its rise above the initial one, and the capacity
         over which released heat is shared.
         """
-        x, gone = self.unbonded_squared(t)
+        # The square and its decrease are accurate to rounding at any time.
+        initial = (1.0 - self.phi_i) ** 2
+        x, gone = initial * np.exp(-2.0 * t / self.tau), -initial * np.expm1(-2.0 * t / self.tau)
         kappa_0, kappa_2 = (K / (self.T_0 * self.C) for K in (self.K_0, self.K_2))
         # 1 - kappa_2 x as a sum of positive numbers
         factor = self.free_capacity + kappa_2 * gone if kappa_2 > 0.0 else 1.0 - kappa_2 * x
@@ -298,16 +295,14 @@ class LatticeGasSprings(Reference):
     .. math:: \phi=\phi_{eq}+(\phi_i-\phi_{eq})e^{-(k_f+k_r)t},\qquad
         \frac{k_r}{k_f}=e^{(k_bg_n^2/2-\varepsilon)/k_BT}=\frac{1-\phi_{eq}}{\phi_{eq}},\qquad t_n=n_ck_bg_n\phi
 
-    Pulled apart in equilibrium, the traction peaks at
-    :math:`k_bg_n^2/k_BT=1+2W_0(\tfrac12e^{\varepsilon/k_BT-1/2})`, and the work of separation is
-    :math:`n_ck_BT\ln(1+e^{\varepsilon/k_BT})`. Any bond energy: no exponential overflows.
+    Any bond energy: no exponential overflows.
 
     Source: Hill (1960), An Introduction to Statistical Thermodynamics, ch. 7, with the elastic energy of Dembo et al.
     (1988), Proc. R. Soc. Lond. B 234, 55-83, doi 10.1098/rspb.1988.0038.
 
-    >>> film = LatticeGasSprings(n_c=1e16, epsilon=6e-20, k_b=1e-3, T=300.0)
-    >>> f"{1e9 * film.peak_gap:.9f} nm, {film.peak_traction:.6f} Pa, {film.work_of_separation:.9e} J/m^2"
-    '9.719412472 nm, 92932.604786 Pa, 6.000000212e-04 J/m^2'
+    >>> film = LatticeGasSprings(n_c=1e16, epsilon=6e-20, k_b=1e-3, T=300.0, g_n=1e-8, k_i=2.0)
+    >>> f"{float(film.equilibrium(film.g_n)):.9f} {film.solution(0.5)['t_n']:.6f} Pa"
+    '0.917913042 60911.890061 Pa'
     """
 
     n_c: float = parameter("1/m^2", "density of bonding sites", above=0)
@@ -326,37 +321,10 @@ class LatticeGasSprings(Reference):
         phi = values["phi_i"]
         return {**values, "k_i": None if phi is None or rate is None or phi == 1.0 else rate / (1.0 - phi)}
 
-    def exponent(self, gap: ArrayLike) -> Array:
-        """Return the free energy of a bond in units of k_B T."""
-        return (0.5 * self.k_b * np.asarray(gap) ** 2 - self.epsilon) / (BOLTZMANN * self.T)
-
     def equilibrium(self, gap: ArrayLike) -> Array:
         """Return the bonding state in equilibrium at a gap [m]."""
-        return np.asarray(np.exp(-np.logaddexp(0.0, self.exponent(gap))))
-
-    def traction(self, gap: ArrayLike) -> Array:
-        """Return the traction [Pa] in equilibrium at a gap [m]."""
-        return self.n_c * self.k_b * np.asarray(gap) * self.equilibrium(gap)
-
-    @property
-    def peak_gap(self) -> float:
-        """Gap [m] at which the traction in equilibrium is largest."""
-        from scipy.special import wrightomega  # W_0 of an exponential, which may overflow
-
-        thermal = BOLTZMANN * self.T
-        w = float(wrightomega(self.epsilon / thermal - 0.5 - math.log(2.0)))
-        return math.sqrt((1.0 + 2.0 * w) * thermal / self.k_b)
-
-    @property
-    def peak_traction(self) -> float:
-        """Largest traction [Pa] in equilibrium."""
-        return float(self.traction(self.peak_gap))
-
-    @property
-    def work_of_separation(self) -> float:
-        """Work [J/m^2] of pulling the surfaces apart in equilibrium."""
-        thermal = BOLTZMANN * self.T
-        return self.n_c * thermal * float(np.logaddexp(0.0, self.epsilon / thermal))
+        exponent = (0.5 * self.k_b * np.asarray(gap) ** 2 - self.epsilon) / (BOLTZMANN * self.T)
+        return np.asarray(np.exp(-np.logaddexp(0.0, exponent)))
 
     def quantities(self, t: Array) -> Quantities:
         distance = float(self.equilibrium(self.g_n)) - self.phi_i

@@ -82,7 +82,7 @@ class CoulombStop(UniformBody):
     Source: Sauer, Duong & Mandadapu (2021), eq. e:dry_fric, with Newton's law, integrated.
 
     >>> slider = CoulombStop(m=5.0, mu=0.25, p=3e4, v_i=2.0, C=100.0, T_0=300.0, T_i=300.0)
-    >>> slider.stop_time, slider.stop_distance, float(slider.solution(0.01)["v"])
+    >>> slider.stop_time, float(slider.solution(0.01)["u_t"]), float(slider.solution(0.01)["v"])
     (0.0013333333333333333, 0.0013333333333333333, 0.0)
     """
 
@@ -97,11 +97,6 @@ class CoulombStop(UniformBody):
     def stop_time(self) -> float:
         """Time [s] at which the mass comes to rest."""
         return self.m * self.v_i / (self.mu * self.p)
-
-    @property
-    def stop_distance(self) -> float:
-        """Slip [m] at rest."""
-        return 0.5 * self.v_i * self.stop_time
 
     def quantities(self, t: Array) -> Quantities:
         sliding = np.minimum(t, self.stop_time)

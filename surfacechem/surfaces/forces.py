@@ -356,9 +356,11 @@ def level_approaches(lower: Surface, upper: Surface, levels: Sequence[float]) ->
     """
     if not all(type(body.shape) is Plane for body in (lower, upper)):
         return [_approach_at_level(lower, upper, level) for level in levels]
-    size = length(lower, upper)
-    below, above = (_corners(body, size * ENDLESS_REACH) for body in (lower, upper))
-    n, m = upper.axes[:, 2], lower.axes[:, 2]
+    size, sides = length(lower, upper), []
+    for plate in (lower, upper):  # the corners of each in order, shape (4, 3)
+        (a, b), (c, e) = np.nan_to_num(plate.shape.span, posinf=size * ENDLESS_REACH, neginf=-size * ENDLESS_REACH)
+        sides.append(np.asarray(plate.derivatives(np.array([(a, c), (b, c), (b, e), (a, e)]), FIRST_ORDER)[0]))
+    (below, above), n, m = sides, upper.axes[:, 2], lower.axes[:, 2]
     found = []
     for moved in (above + level * n for level in levels):
         # A corner of one plate over the other; the upper one is offset by the level.
@@ -391,12 +393,6 @@ def _approach_at_level(lower: Surface, upper: Surface, level: float) -> float:
         step = left * (step / (before - left) if before - left else 1.0) if math.isfinite(before) else left
         d, before = d + step, left
     return d
-
-
-def _corners(plate: Surface, far: float) -> Array:
-    """Return the corners of a plate in order, shape (4, 3)."""
-    (a, b), (c, e) = np.nan_to_num(plate.shape.span, posinf=far, neginf=-far)
-    return np.asarray(plate.derivatives(np.array([(a, c), (b, c), (b, e), (a, e)]), FIRST_ORDER)[0])
 
 
 def _is_on_plate(plate: Surface, x: Array) -> NDArray[np.bool_]:

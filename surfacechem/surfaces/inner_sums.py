@@ -219,7 +219,12 @@ class Rays:
     def at(self, s: Array) -> tuple[Array, Array]:
         """Return points (k, ..., 3) at parts (k, ...) of the rays, and areas per area of the coordinates (k, ...)."""
         there = (slice(None), *[None] * (s.ndim - 1))
-        return pole_free(self.surface, self.start[there] + s[..., None] * (self.end - self.start)[there])
+        w = self.start[there] + s[..., None] * (self.end - self.start)[there]
+        if not has_pole(self.surface):
+            return self.surface.elements(w)
+        u = np.maximum(np.hypot(w[..., 0], w[..., 1]), POLE)
+        x, areas = self.surface.elements(np.stack([u, np.arctan2(w[..., 1], w[..., 0])], axis=-1))
+        return x, areas / u
 
     def distances(self, s: Array) -> Array:
         """Return the distances of the points at parts (k, ...) of the rays."""
@@ -230,15 +235,6 @@ class Rays:
 def has_pole(surface: Surface) -> bool:
     """True if the parameters of a surface are a distance from a pole and an angle about it."""
     return surface.shape.about_axis and not surface.shape.closed[0]
-
-
-def pole_free(surface: Surface, w: Array) -> tuple[Array, Array]:
-    """Return points (..., 3) at coordinates (..., 2), and areas per area of these (...)."""
-    if not has_pole(surface):
-        return surface.elements(w)
-    u = np.maximum(np.hypot(w[..., 0], w[..., 1]), POLE)
-    x, areas = surface.elements(np.stack([u, np.arctan2(w[..., 1], w[..., 0])], axis=-1))
-    return x, areas / u
 
 
 def ray_grid(surface: Surface, x: Array, near: Projection, reach: Array, extent: Extent, level: int) -> Grid:

@@ -128,7 +128,7 @@ class Surface:
         x = np.asarray(x, dtype=float)
         own = (x - [0.0, 0.0, self.approach]) @ self.axes
         if self.shape.foot is not None:
-            at = self.shape.foot(own)
+            at = np.clip(self.shape.foot(own), *np.transpose(self.shape.span))
         else:
             which, starts = self.shape.starts(own.reshape(-1, 3))
             places = x.reshape(-1, 3)[which]
@@ -198,8 +198,10 @@ class Surface:
             D = self.derivatives(at, SECOND_ORDER)
             away = places[which] - D[0]
             slope = np.stack([-_dot(away, D[1]), -_dot(away, D[2])], axis=-1)
-            metric, hessian = _forms(D, away)
-            move = newton_step(slope, hessian, metric, at <= low, at >= high)
+            E, F, G = _dot(D[1], D[1]), _dot(D[1], D[2]), _dot(D[2], D[2])
+            # Second derivatives of half the squared distance.
+            hessian = E - _dot(away, D[3]), F - _dot(away, D[4]), G - _dot(away, D[5])
+            move = newton_step(slope, hessian, (E, F, G), at <= low, at >= high)
             if self.shape.about_axis:
                 move[..., 1] = 0.0  # keep the angle about the axis
             return move
@@ -215,16 +217,6 @@ def cross(a: Array, b: Array) -> Array:
     """Return vector products (..., 3); for few vectors in a tenth of the time of NumPy's."""
     (a0, a1, a2), (b0, b1, b2) = ((v[..., 0], v[..., 1], v[..., 2]) for v in (a, b))
     return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
-
-
-def _metric(D: Array) -> tuple[Array, Array, Array]:
-    return _dot(D[1], D[1]), _dot(D[1], D[2]), _dot(D[2], D[2])
-
-
-def _forms(D: Array, away: Array) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
-    """Return the metric, and the second derivatives of half the squared distance, each uu, uv, vv."""
-    E, F, G = _metric(D)
-    return (E, F, G), (E - _dot(away, D[3]), F - _dot(away, D[4]), G - _dot(away, D[5]))
 
 
 def descended(

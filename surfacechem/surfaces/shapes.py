@@ -89,9 +89,8 @@ class Plane(Shape):
         return _half(self.length), _half(self.width)
 
     def foot(self, x: Array) -> Array:
-        """Return the parameters of the closest point: below the point, or on the edge."""
-        low, high = np.transpose(self.span)
-        return np.asarray(np.clip(x[..., :2], low, high))
+        """Return the parameters of the point below."""
+        return x[..., :2]
 
 
 class Sphere(Shape):
@@ -122,11 +121,10 @@ class Sphere(Shape):
         return (0.0, math.pi), FULL_TURN
 
     def foot(self, x: Array) -> Array:
-        """Return the parameters of the closest point: along the radius, or on the edge."""
+        """Return the parameters of the closest point: along the radius."""
         # The direction from the centre, as an angle from the apex.
         up = self.R + self.bulge * x[..., 2]
-        angles = np.arctan2(np.hypot(x[..., 0], x[..., 1]), up), np.arctan2(x[..., 1], x[..., 0])
-        return np.asarray(np.clip(np.stack(angles, axis=-1), *np.transpose(self.span)))
+        return np.stack([np.arctan2(np.hypot(x[..., 0], x[..., 1]), up), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
 
 
 class Cap(Sphere):
@@ -192,8 +190,8 @@ class Cylinder(Shape):
         return _half(self.length), FULL_TURN
 
     def foot(self, x: Array) -> Array:
-        """Return the parameters of the closest point: along the radius, or on the edge."""
-        return np.stack([np.clip(x[..., 0], *_half(self.length)), np.arctan2(x[..., 1], x[..., 2] + self.R)], axis=-1)
+        """Return the parameters of the closest point: along the radius."""
+        return np.stack([x[..., 0], np.arctan2(x[..., 1], x[..., 2] + self.R)], axis=-1)
 
 
 class SurfaceOfRevolution(Shape):
@@ -238,9 +236,8 @@ class Disc(SurfaceOfRevolution):
         return u * cos(v), u * sin(v), 0 * u
 
     def foot(self, x: Array) -> Array:
-        """Return the parameters of the closest point: below the point, or on the edge."""
-        at = np.stack([np.hypot(x[..., 0], x[..., 1]), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
-        return np.asarray(np.clip(at, *np.transpose(self.span)))
+        """Return the parameters of the point below."""
+        return np.stack([np.hypot(x[..., 0], x[..., 1]), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
 
 
 class Paraboloid(SurfaceOfRevolution):
@@ -284,10 +281,9 @@ class Cone(SurfaceOfRevolution):
         return u * cos(v), u * sin(v), -u * math.tan(self.slope)
 
     def foot(self, x: Array) -> Array:
-        """Return the parameters of the closest point: on the side below the point, or on the tip or the edge."""
+        """Return the parameters of the closest point of the side below the point."""
         along = np.hypot(x[..., 0], x[..., 1]) * math.cos(self.slope) - x[..., 2] * math.sin(self.slope)
-        at = np.stack([along * math.cos(self.slope), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
-        return np.asarray(np.clip(at, *np.transpose(self.span)))
+        return np.stack([along * math.cos(self.slope), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
 
 
 class Torus(Shape):
