@@ -483,11 +483,6 @@ class RateLaw(Law):
         return None
 
     @property
-    def lacks_length(self) -> bool:
-        """True if the rate depends on a force that is missing in the affinity, from which its reverse follows."""
-        return self.balanced and self.length is None and "f" in reads(self.statement)
-
-    @property
     def taken(self) -> tuple[Callable[..., Expression], Callable[..., Expression]] | None:
         """Enthalpy and Gibbs energy [J] that one reaction takes from neighbouring phases; None if nothing.
 

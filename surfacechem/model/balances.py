@@ -177,14 +177,17 @@ class Rows(dict[str, Expression]):
         """Set x_dot = rate."""
         self[name] = _dot(name) - rate
 
-    def momentum(self, name: str, force: Expression, mass: Expression, moves: Expression = 1) -> None:
-        """Set Newton's law, mass times acceleration = force; a held body keeps its velocity."""
-        self[name] = _dot(name) - moves * force / mass
+    def momentum(
+        self, name: str, force: Expression, mass: Expression, moves: Expression = 1, inertia: Expression | None = None
+    ) -> None:
+        """Set Newton's law, mass times acceleration = force; a held body keeps its velocity.
 
-    def momentum_of(self, name: str, inertia: Expression, force: Expression, moves: Expression) -> None:
-        """Set inertia = force, for a state that is a function of the velocity rather than the velocity."""
-        # No blend of both cases: a tiny inertia would be lost to rounding next to the term that is off.
-        self[name] = where(moves > 0, inertia - force, _dot(name))
+        ``inertia`` replaces the mass for a state that is a function of the velocity rather than the velocity.
+        """
+        if inertia is None:
+            self[name] = _dot(name) - moves * force / mass
+        else:  # no blend of both cases: a tiny inertia would be lost to rounding next to the term that is off
+            self[name] = where(moves > 0, inertia - force, _dot(name))
 
     def equilibrium(
         self, name: str, driving_rate: Expression, moves: Expression = 1, held: Expression | None = None

@@ -22,7 +22,7 @@ from surfacechem.references.base import Array, Parameters, Quantities, Reference
 from surfacechem.references.numerics import first_difference, increasing_root, scaled_rise, second_difference
 
 if TYPE_CHECKING:
-    from surfacechem.scene import Scene
+    from surfacechem.scene import Body, Scene
 
 
 class PairExchange(Reference):
@@ -498,11 +498,16 @@ def _beside_conduction(scene: Scene) -> Iterator[str]:
         if path.name() != "conductance" or set(path.between) != bodies or path.varying:
             yield f"the heat path {path.name()} is no constant one between the bodies"
     for body in scene.bodies:
-        energy, conduction = body.energy, body.conduction
-        if energy is not None and (energy.name() != "constant" or energy.varying):
-            yield f"the heat capacity of {body.name} varies"
-        if conduction is not None and conduction.varying:
-            yield f"the conductivity of {body.name} varies"
-        loads = [body.temperature, conduction.far if conduction else None]
-        if any(isinstance(load, Load) and load.name() != "hold" for load in loads):
-            yield f"a temperature of {body.name} varies"
+        yield from _not_constant(body)
+
+
+def _not_constant(body: Body) -> Iterator[str]:
+    """Yield the properties of a body that are not constant, in words."""
+    energy, conduction = body.energy, body.conduction
+    if energy is not None and (energy.name() != "constant" or energy.varying):
+        yield f"the heat capacity of {body.name} varies"
+    if conduction is not None and conduction.varying:
+        yield f"the conductivity of {body.name} varies"
+    loads = [body.temperature, conduction.far if conduction else None]
+    if any(isinstance(load, Load) and load.name() != "hold" for load in loads):
+        yield f"a temperature of {body.name} varies"

@@ -54,6 +54,7 @@ class TestFriction:
         for column, quantity in {"x": "u_t", "xdot": "v", "spring_traction": "spring_traction", "heat": "heat"}.items():
             rounding = 4 * effect_of_rounding(slider, columns["t"], quantity)
             assert np.all(np.abs(exact[quantity] - columns[column]) <= 1e-12 * np.abs(columns[column]) + rounding)
+        assert 4e4 * slider.slip.distance == pytest.approx(expect.pop("heat_per_cycle"), rel=1e-14)
         for name, value in expect.items():
             assert attrgetter(CALLED.get(name, name))(slider) == pytest.approx(value, rel=1e-14)
 

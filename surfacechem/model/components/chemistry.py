@@ -76,9 +76,9 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | RatePair | Margin
         yield Power(WORK, OUTSIDE, INTERFACE, work, "W_f", "work of the prescribed force on bonds")
     for pair in pairs:
         yield from departure(build, pair, {name: value + load.get(name, 0) for name, value in mu.items()})
-    changes = _changes(found)
     for name, bond in build.bonding.items():
-        build.rows.sites(name, symengine.Add(*changes.get(name, ())), bond.density, build.stretch)
+        changes = (item.law.stoichiometry().get(name, 0) * item.rate for item in found)
+        build.rows.sites(name, symengine.Add(*changes), bond.density, build.stretch)
         formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
         yield Account(formed, bond.dot - build.rows[name], "bonds", name)
     phi = symengine.Symbol("phi")
@@ -86,15 +86,6 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | RatePair | Margin
         M, rate = _potential_per_area(build, "phi", phi, build.psi), build.rate_of("phi")
         if rate != 0:
             yield Power(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
-
-
-def _changes(found: Iterable[Reaction]) -> dict[str, list[Expression]]:
-    """Return the contributions of reactions to the rate of each bonding variable."""
-    changes: dict[str, list[Expression]] = {}
-    for item in found:
-        for name, nu in item.law.stoichiometry().items():
-            changes.setdefault(name, []).append(nu * item.rate)
-    return changes
 
 
 def _chemical_potentials(build: Build) -> dict[str, Expression]:

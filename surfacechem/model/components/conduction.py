@@ -134,20 +134,16 @@ def _conductivity(build: Build, slab: Slab, surface: str, reference: Expression)
 def outputs(build: Build) -> Iterator[State | Profile | Conductor]:
     """Set the balances of the nodes inside the bodies; yield their states, after all other states."""
     for number, body in enumerate(build.scene.bodies, start=1):
-        if body.conduction is not None:
-            yield _conductor(build, number, body, body.conduction)
+        if body.conduction is not None:  # the data from which one judges whether a body may be one lump
+            node, ends = build.thermal.node_of[body.name], build.conductances
+            F = node.energies[body.name] / build.thermal.volume(body.name)[body.name]
+            paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH_BODIES for h in several]
+            alone = sum(other is node for other in build.thermal.node_of.values()) == 1
+            resistance, capacity = build.thermal.resistances[body.name], -node.T * balances.second(F, node.T)
+            whole = symengine.Add(*paths) if alone else None
+            yield Conductor(number, body.name, not body.conduction.cells, resistance, capacity, whole)
     for slab in build.thermal.slabs.values():
         yield from _profile(build, slab)
-
-
-def _conductor(build: Build, number: int, body: Body, law: Conduction) -> Conductor:
-    """Return the data from which one judges whether a body may be one lump."""
-    node, ends = build.thermal.node_of[body.name], build.conductances
-    F = node.energies[body.name] / build.thermal.volume(body.name)[body.name]
-    paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH_BODIES for h in several]
-    alone = sum(other is node for other in build.thermal.node_of.values()) == 1
-    resistance, capacity = build.thermal.resistances[body.name], -node.T * balances.second(F, node.T)
-    return Conductor(number, body.name, not law.cells, resistance, capacity, symengine.Add(*paths) if alone else None)
 
 
 def _profile(build: Build, slab: Slab) -> Iterator[State | Profile]:

@@ -55,7 +55,14 @@ def _shared(build: Build) -> Expression:
 
 def laws(build: Build) -> Iterator[Margin]:
     """Yield margins that end a run at rupture: loaded bonds break ever faster, beyond what time resolves."""
-    carriers = list(_carriers(build))
+    # Bonds whose rupture increases the load on the rest: they share it, or hold a gap with a balance.
+    carriers = []
+    for role in (role for role in build.variables.roles if build.variables.was_read(role.variable)):
+        if role.by == SHARED_LOAD:
+            carriers.append(("phi", build.variables.get("phi", "the force per bond", "interface")))
+        if role.by == BOND_ELASTICITY and "g_n" in build.motion.gap_rates:
+            name = role.variable.removeprefix("f_") if role.variable != "f" else "phi"
+            carriers.append((name, build.bonding[name].symbol))
     for name, bonds in carriers:
         losses = (
             derivative(bonds, b.symbol) * build.rows[other].subs({b.dot: 0}) for other, b in build.bonding.items()
@@ -68,13 +75,3 @@ def laws(build: Build) -> Iterator[Margin]:
             left = where(bonds > LEAST_BONDED, left, NO_AMOUNT)
             which = f"the bonds {name}" if len(carriers) > 1 else "the bonds"
             yield Margin(f"{name} left", left, f"{which} ruptured", remedy=OVERLOAD, path="interface")
-
-
-def _carriers(build: Build) -> Iterator[tuple[str, Expression]]:
-    """Yield bonds whose rupture increases the load on the rest: they share it, or hold a gap with a balance."""
-    for role in build.variables.roles:
-        if role.by == SHARED_LOAD and build.variables.was_read(role.variable):
-            yield "phi", build.variables.get("phi", "the force per bond", "interface")
-        if role.by == BOND_ELASTICITY and build.variables.was_read(role.variable) and "g_n" in build.motion.gap_rates:
-            name = role.variable.removeprefix("f_") if role.variable != "f" else "phi"
-            yield name, build.bonding[name].symbol

@@ -262,13 +262,6 @@ def _refuse_one_component(law: Friction) -> None:
             raise InputError(f"{name} varies with one component of the velocity, and this scene has two.", law.place)
 
 
-def resist(build: Build, d: Direction, traction: Expression) -> None:
-    """Add to the resistance to slip in a direction, if the interface moves by a balance."""
-    if build.motion.slips:
-        tractions = build.motion.sliding_tractions
-        tractions[d.axis] = tractions.get(d.axis, 0) + traction
-
-
 def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:
     """Add the traction up to which a friction law sticks: its limit, or the kinetic friction at v = 0 if larger."""
     sticking = [slip.d for slip in build.motion.slips if slip.sticks]

@@ -140,19 +140,16 @@ class FluidFit:
         self.known = [*starts, *build.interface.medium.temperatures] or [build.scene.T_0 or 300.0]
         self.start = sum(self.known) / len(self.known)
         self.ranges: set[tuple[float, float]] = set()
-        self._watch_walls()
-        if fluid.remark:
-            build.add(fluid.remark)
-
-    def _watch_walls(self) -> None:
-        """Add cautions for walls beyond the range of the fluid; the film has its properties at its mean temperature."""
-        span, thermal = self.fluid.range(self.start), self.build.thermal
-        for body in self.build.scene.bodies:
-            wall = thermal.nodes[thermal.members[body.name]].T
+        # The film has its properties at its mean temperature, also where a wall is beyond the range of the fluid.
+        span = fluid.range(self.start)
+        for body in build.scene.bodies:
+            wall = build.thermal.node_of[body.name].T
             if wall != self.T:
                 rest = f"at the wall of {body.name}, while the film keeps the properties that it has at {self.T}."
-                self.build.add(Caution(span.high - wall, f"{span.reason_high} {rest}"))
-                self.build.add(Caution(wall - span.low, f"{span.reason_low} {rest}"))
+                build.add(Caution(span.high - wall, f"{span.reason_high} {rest}"))
+                build.add(Caution(wall - span.low, f"{span.reason_low} {rest}"))
+        if fluid.remark:
+            build.add(fluid.remark)
 
     def property(self, name: str) -> Expression:
         """Name a property of the fluid, constant beyond its range."""

@@ -246,10 +246,7 @@ class FarField:
         if self.mount.inertial:
             rows.kinematics(name, rate)
             force = symengine.Add(self.force(self.gap, rate), *resisted, -self.c_g * rate)
-            if inertia is None:
-                rows.momentum(velocity, force, self.m, active)
-            else:
-                rows.momentum_of(velocity, inertia, force, active)
+            rows.momentum(velocity, force, self.m, active, inertia)
         elif self.mount.damped:
             rows.kinematics(name, rate)  # at the rate of the dampers under the unbalanced traction
         else:

@@ -134,10 +134,10 @@ def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed
             raise InputError(message, idle.place)
         return {}
     # A rate that depends on the force while its reverse follows from the affinity, without the work.
-    unknown = next((law for law in laws.values() if law.lacks_length), None)
-    if unknown is not None:
-        _hold_at_zero(build, unknown)
-        return {}
+    for law in laws.values():
+        if law.balanced and law.length is None and "f" in reads(law.statement):
+            _hold_at_zero(build, law)
+            return {}
     found = lengths(laws, pairs)
     if not found:
         return {}

@@ -25,7 +25,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, exp, sqrt, where
 from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
-from surfacechem.model.components.formulation import displacement, evolve, in_parallel, resist, resistance, stick_limit
+from surfacechem.model.components.formulation import displacement, evolve, in_parallel, resistance, stick_limit
 from surfacechem.model.components.mounting import ACROSS, ALONG
 from surfacechem.model.system import Given, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
@@ -54,7 +54,8 @@ def laws(build: Build) -> Iterator[Power | State | Margin]:
             resisting[d.axis] = resisting.get(d.axis, 0) + unbonded * named
             power += unbonded * nominal * build.variables.get(d.velocity, law)
             total += unbonded * nominal
-            resist(build, d, nominal)
+            tractions = build.motion.sliding_tractions
+            tractions[d.axis] = tractions.get(d.axis, 0) + nominal
         yield Power(DISSIPATION, MECHANICS, INTERFACE, power, label)
         if not build.motion.slips:
             text = f"work done against {law.title}"
