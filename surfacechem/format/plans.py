@@ -488,13 +488,16 @@ def recorded_plan(record: object) -> Plan:
 
 
 def split_arrays(over: Mapping[str, object]) -> tuple[dict[str, object], dict[str, Array]]:
-    """Return the values as in a case, and separately the numerical arrays, which are not read entry by entry."""
+    """Return the values as in a case, and separately numerical arrays, ranges, and columns of tables and datasets, which
+    are not read entry by entry.
+    """
     lists, arrays = dict(over), {}
     for path, values in over.items():
-        if isinstance(values, np.ndarray):
-            lists[path] = values.tolist()
-            if values.ndim == 1 and values.dtype.kind in "iuf":
-                lists[path], arrays[path] = [], values.astype(float)
+        if isinstance(values, range) or hasattr(values, "__array__"):
+            array = np.asarray(values)
+            lists[path] = array.tolist()
+            if array.ndim == 1 and array.dtype.kind in "iuf":
+                lists[path], arrays[path] = [], array.astype(float)
     return lists, arrays
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray
 from scipy import stats
 
 import surfacechem
@@ -99,7 +100,9 @@ def test_a_plan_of_a_case_has_a_grid_and_a_sample(bonding, tmp_path, monkeypatch
 
 def test_arrays_are_the_lists_of_their_numbers(bonding):
     for values in (np.linspace(1.0, 300.0, 7), np.geomspace(1.0, 300.0, 7), np.array([2, 5, 3]), np.array([7.0])):
-        plan, listed = (bonding.plan({K_0: given}) for given in (values, values.tolist()))
+        ways = values, values.tolist(), xarray.DataArray(values)
+        plan, listed, column = (bonding.plan({K_0: given}) for given in ways)
+        assert column.record == plan.record
         assert plan.at(np.arange(plan.size))[K_0].tolist() == listed.at(np.arange(plan.size))[K_0].tolist()
         assert recorded_plan(plan.record).at(np.arange(plan.size))[K_0].tolist() == values.tolist()
     assert len(bonding.plan({K_0: np.linspace(1.0, 300.0, 100_000)}).record) < 200
