@@ -429,7 +429,7 @@ def plot(
     from surfacechem import plots
 
     solutions = {case: solve(load_case(case, changes).run, talk, brief=True) for case in cases}
-    shown = [solutions[source].dataset if source in solutions else source for source in sources]
+    shown = [solutions[source].data if source in solutions else source for source in sources]
     plots.write(plots.figure(shown, split_list(variables), against, celsius), target)
     if talk is not False:
         typer.echo(str(target))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
@@ -488,12 +488,12 @@ def recorded_plan(record: object) -> Plan:
 
 
 def split_arrays(over: Mapping[str, object]) -> tuple[dict[str, object], dict[str, Array]]:
-    """Return the values as in a case, and separately numerical arrays, ranges, and columns of tables and datasets, which
-    are not read entry by entry.
+    """Return the values as in a case, and separately numbers that are not read entry by entry: arrays, ranges, and
+    columns of tables and datasets.
     """
     lists, arrays = dict(over), {}
     for path, values in over.items():
-        if isinstance(values, range) or hasattr(values, "__array__"):
+        if isinstance(values, Collection) and not isinstance(values, str | list | tuple | Mapping):
             array = np.asarray(values)
             lists[path] = array.tolist()
             if array.ndim == 1 and array.dtype.kind in "iuf":

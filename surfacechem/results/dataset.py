@@ -24,7 +24,7 @@ from surfacechem.results.netcdf import (
     CONVENTIONS,
     TABLES,
     Column,
-    as_dataset,
+    Data,
     dataset_path,
     package_version,
     save,
@@ -169,9 +169,14 @@ class Results(ABC):
         }
 
     @cached_property
+    def data(self) -> Data:
+        """The dataset for figures and reports, without the imports of xarray."""
+        return Data.of_columns(self.columns, self.attributes)
+
+    @cached_property
     def dataset(self) -> xarray.Dataset:
         """The xarray Dataset."""
-        return as_dataset(self.columns, self.attributes)
+        return self.data.to_xarray()
 
     def __getitem__(self, name: str) -> xarray.DataArray:
         """Return a variable of the dataset by name; InputError if it has none of that name."""
@@ -201,7 +206,7 @@ class Results(ABC):
         InputError
             If the dataset has no variable of a name.
         """
-        figure: Figure = _above("plots").figure(self.dataset, variables, against, celsius)
+        figure: Figure = _above("plots").figure(self.data, variables, against, celsius)
         return figure
 
     def report(self, path: str | Path = "report.html") -> Path:
@@ -222,7 +227,7 @@ class Results(ABC):
         InputError
             If the name of the file is that of another format.
         """
-        written: Path = _above("studies.run_report").write(self.dataset, path)
+        written: Path = _above("studies.run_report").write(self.data, path)
         return written
 
     def _repr_html_(self) -> str:

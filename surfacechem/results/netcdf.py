@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -131,6 +131,38 @@ class Data:
         variables = {name: DataVariable(*part) for name, part in parts.items()}
         return cls(variables, dataset.attrs, {*map(str, dataset.coords)}, str(dataset.encoding.get("source", "")))
 
+    @classmethod
+    def made_of(cls, variables: Iterable[DataVariable], attributes: Mapping[str, Any], file: str = "") -> Data:
+        """Return variables as a dataset; those along themselves, time, and those in an attribute are coordinates."""
+        known, attributes = {each.name: each for each in variables}, dict(attributes)
+        said = [*str(attributes.pop(COORDINATES, "")).split(), "time"]
+        return cls(known, attributes, [name for name, v in known.items() if v.dims == (name,) or name in said], file)
+
+    @classmethod
+    def of_columns(cls, columns: Iterable[Column], attributes: Mapping[str, Any]) -> Data:
+        """Return columns as a dataset."""
+        found = (DataVariable(c.name, c.dimensions, np.asarray(c.values), c.attributes) for c in columns)
+        return cls.made_of(found, attributes)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The xarray Dataset."""
+        import pandas
+        import xarray
+
+        # Checks of an array import Dask and Pint if installed, for a second.
+        found = {v.name: xarray.Variable(v.dims, v.values, v.attrs, fastpath=True) for v in self.variables.values()}
+        indexes: dict[Any, Any] = {}
+        for name in self.coords:
+            if found[name].dims == (name,):
+                values = self[name].values
+                indexes[name] = xarray.indexes.PandasIndex(pandas.Index(values, dtype=values.dtype), name)
+                found |= indexes[name].create_variables({name: found[name]})
+        order = [*self, *self.coords]
+        # The public constructor merges variable by variable, which takes longer than all else: here nothing differs.
+        return xarray.Dataset._construct_direct(
+            {name: found[name] for name in order}, {*self.coords}, dict(self.sizes), {**self.attrs}, indexes
+        )
+
     @cached_property
     def sizes(self) -> dict[str, int]:
         """Length of each dimension."""
@@ -174,33 +206,6 @@ def package_version(name: str) -> str:
 def versions() -> str:
     """Return the versions of the packages on which a result depends."""
     return ", ".join(f"{name} {package_version(name)}" for name in ("surfacechem", "numpy", "numba", "symengine"))
-
-
-def as_dataset(columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> xarray.Dataset:
-    """Return the xarray Dataset of columns; columns along themselves, time, and those in an attribute are
-    coordinates.
-    """
-    import pandas
-    import xarray
-
-    attributes = dict(attributes)
-    said = [*str(attributes.pop(COORDINATES, "")).split(), "time"]
-    data: dict[str, Any] = {}
-    coordinates: dict[str, Any] = {}
-    indexes: dict[str, Any] = {}
-    sizes: dict[Any, int] = {}
-    for c in columns:
-        values = np.asarray(c.values)
-        sizes |= zip(c.dimensions, values.shape, strict=True)
-        # Checks of an array import Dask and Pint if installed, for a second.
-        variable = xarray.Variable(c.dimensions, values, c.attributes, fastpath=True)
-        if c.dimensions == (c.name,):
-            indexes[c.name] = xarray.indexes.PandasIndex(pandas.Index(values, dtype=values.dtype), c.name)
-            coordinates |= indexes[c.name].create_variables({c.name: variable})
-        else:
-            (coordinates if c.name in said else data)[c.name] = variable
-    # The public constructor merges variable by variable, which takes longer than all else: here nothing differs.
-    return xarray.Dataset._construct_direct({**data, **coordinates}, set(coordinates), sizes, attributes, indexes)
 
 
 def dataset_path(path: str | Path) -> Path:
@@ -319,14 +324,12 @@ def read_netcdf(path: Path) -> Data:
 
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
-        variables = {
-            name: DataVariable(name, item.dimensions, np.asarray(item[...]), attributes(item))
+        variables = [
+            DataVariable(name, item.dimensions, np.asarray(item[...]), attributes(item))
             for name, item in file.variables.items()
-        }
+        ]
         whole = attributes(file)
-    said = str(whole.pop(COORDINATES, "")).split()
-    coordinates = frozenset(name for name, item in variables.items() if item.dims == (name,) or name in said)
-    return Data(variables, whole, coordinates, str(path))
+    return Data.made_of(variables, whole, str(path))
 
 
 def save_kept(dataset: xarray.Dataset, target: Path) -> Path:

@@ -39,7 +39,7 @@ import numpy as np
 
 from surfacechem.errors import InputError, Place
 from surfacechem.quantities import raised
-from surfacechem.results.netcdf import CONVENTIONS, Column, as_dataset, replacing, save
+from surfacechem.results.netcdf import CONVENTIONS, Column, Data, replacing, save
 from surfacechem.runs.listing import columns, plain
 
 if TYPE_CHECKING:
@@ -337,7 +337,7 @@ class Study:
         solvers by name; since ``tolerance`` is also an argument of ``sel``, tolerances are selected by
         ``sel({"tolerance": 1e-8})``.
         """
-        return as_dataset(self.columns, self.attributes)
+        return Data.of_columns(self.columns, self.attributes).to_xarray()
 
     def figure(self) -> Figure:
         """Draw the figure of the study, from its dataset alone.

@@ -51,7 +51,7 @@ QUICK_SECONDS = 1.0
 TOLERANCES = tuple(10.0**-digits for digits in (4, 6, 8, 10))
 
 
-def page(data: xarray.Dataset | str | Path) -> Page:
+def page(data: Data | xarray.Dataset | str | Path) -> Page:
     """Return the report of a dataset of a run or a sweep, or of its file."""
     dataset = opened(data)
     place = Place(str(data)) if isinstance(data, str | Path) else None
@@ -81,7 +81,7 @@ def page(data: xarray.Dataset | str | Path) -> Page:
     return Page(attributes.get("title", "untitled"), command, sections, omissions, lambda: figure(untitled))
 
 
-def _again(data: xarray.Dataset | str | Path, attributes: Mapping[str, Any]) -> tuple[str, str]:
+def _again(data: Data | xarray.Dataset | str | Path, attributes: Mapping[str, Any]) -> tuple[str, str]:
     """Return the command that repeats the run of a dataset, empty if there is none, and its requirements."""
     if not attributes["case"]:
         return "", "The scene was built in Python; its script runs it again."
@@ -105,7 +105,7 @@ def report_path(path: str | Path) -> Path:
     return target
 
 
-def write(data: xarray.Dataset | str | Path, path: str | Path) -> Path:
+def write(data: Data | xarray.Dataset | str | Path, path: str | Path) -> Path:
     """Save the report of a dataset as one HTML file, whole or not at all."""
     target = report_path(path)
     page(data).write(target)

@@ -13,7 +13,7 @@ from case_runs import solved
 import surfacechem
 from surfacechem.errors import InputError, OutputError
 from surfacechem.format import names
-from surfacechem.results.netcdf import COORDINATES, Column, as_dataset, cf_unit, replacing, save, write_netcdf
+from surfacechem.results.netcdf import COORDINATES, Column, Data, cf_unit, replacing, save, write_netcdf
 
 pytestmark = pytest.mark.around
 
@@ -116,7 +116,7 @@ def test_a_dataset_is_as_the_public_constructor_makes_it(name):
     along = [c.name for c in columns if c.dimensions == (c.name,)]
     every = {c.name: (c.dimensions, c.values, c.attributes) for c in columns if c.name not in along}
     public = xarray.Dataset(every, {c.name: (c.dimensions, c.values, c.attributes) for c in columns if c.name in along})
-    found = as_dataset(columns, attributes)
+    found = Data.of_columns(columns, attributes).to_xarray()
     xarray.testing.assert_identical(found, public.assign_attrs(attributes))
     for mine, usual in ((found.variables, public.variables), (found.coords, public.coords)):
         assert list(mine) == list(usual)
@@ -124,7 +124,10 @@ def test_a_dataset_is_as_the_public_constructor_makes_it(name):
     for axis in public.indexes:
         assert found.indexes[axis].identical(public.indexes[axis])
         assert found.isel({axis: -1}).identical(public.isel({axis: -1}).assign_attrs(attributes))
-    assert as_dataset(columns, {COORDINATES: columns[-1].name}).coords.keys() == {*along, columns[-1].name}
+    assert Data.of_columns(columns, {COORDINATES: columns[-1].name}).to_xarray().coords.keys() == {
+        *along,
+        columns[-1].name,
+    }
 
 
 def test_a_file_is_replaced_whole(solution, tmp_path):
