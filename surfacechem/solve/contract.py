@@ -97,19 +97,9 @@ class Guard:
         return cls(terminal=True)
 
     @classmethod
-    def bear(cls) -> "Guard":
-        """Return a terminal event: the run ends where the margin falls below zero."""
-        return cls(terminal=True, strict=True)
-
-    @classmethod
     def restart(cls, direction: int = 0) -> "Guard":
         """Return a kink: a step ends there and the run goes on."""
         return cls(terminal=False, direction=direction)
-
-    @classmethod
-    def peak(cls) -> "Guard":
-        """Return a narrow peak: a step ends there, short enough to have resolved it."""
-        return cls(terminal=False, direction=0, smooth=True)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,23 +8,8 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.contract import HEAT_STEPS
+from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.consistency import find_consistent
-from surfacechem.solve.radau.stepper import (
-    ARCS,
-    BONDS,
-    ENTROPY_OUT,
-    EVENTS,
-    HEAT_OUT,
-    HEAT_SOURCE,
-    JUMPS,
-    MEASURE,
-    PRODUCED,
-    REFUSES,
-    RELEASED,
-    RESTS,
-    RETURNS,
-    WORK,
-)
 from surfacechem.solve.radau.work import (
     GUARD_RATES,
     MAGNITUDES,
@@ -107,7 +92,7 @@ def _closing(w: Any, m: int) -> int:
         return OPEN
     if value < -max(min(DRIFT * w.rtol, MOST_DRIFT) * size, small):
         return CLOSED
-    rests = w.edges[m - w.n_margins + w.edges.shape[0], RESTS] == 1
+    rests = w.edges[m - w.n_margins + w.edges.shape[0], stepper.RESTS] == 1
     return RESTING if rests else NEAR if w.kinds[m, 3] == 0 else OPEN
 
 
@@ -208,49 +193,45 @@ def _add_to_ledger(w: Any, released: float, gain: float, heat: float, entropy: f
     """Add the amounts of the jump to the accounts of the ledger."""
     for m in range(w.n_ledger):
         kind, place = w.accounts[m, 0], w.accounts[m, 1]
-        if kind == BONDS:
+        if kind == stepper.BONDS:
             w.booked[m] += w.after[1 + place] - w.moment[1 + place]
-        elif kind == WORK:
+        elif kind == stepper.WORK:
             w.booked[m] += w.totals_after[place] - w.totals_before[place]
-        elif kind == RELEASED:
+        elif kind == stepper.RELEASED:
             w.booked[m] += released
-        elif kind == PRODUCED:
+        elif kind == stepper.PRODUCED:
             w.booked[m] += gain
-        elif kind == HEAT_OUT:
+        elif kind == stepper.HEAT_OUT:
             w.booked[m] -= heat
-        elif kind == ENTROPY_OUT:
+        elif kind == stepper.ENTROPY_OUT:
             w.booked[m] -= entropy
 
 
 @compiled
-def _write_event(w: Any, i: int, e: int) -> None:
-    """Write the edge and the moment at which it is carried out."""
-    counts, n = w.counts[i], w.n
-    if counts[EVENTS] < w.events.shape[1]:
-        row = w.events[i, counts[EVENTS]]
+def _write(w: Any, i: int, e: int, released: float, gain: float, heat: float, entropy: float, valid: bool) -> None:
+    """Write the edge and the moment at which it is carried out, and the jump along it."""
+    counts, n, given = w.counts[i], w.n, w.totals_before.shape[0] - 4
+    if counts[stepper.EVENTS] < w.events.shape[1]:
+        row = w.events[i, counts[stepper.EVENTS]]
         row[0] = w.n_margins - w.edges.shape[0] + e
         copy(w.moment[: 1 + 2 * n], row[1:])
         copy(w.booked, row[2 + 2 * n :])
-    counts[EVENTS] += 1
-
-
-@compiled
-def _write_jump(w: Any, i: int, e: int, released: float, gain: float, heat: float, entropy: float, valid: bool) -> None:
-    counts, given = w.counts[i], w.totals_before.shape[0] - 4
-    if counts[JUMPS] < w.jumps.shape[1]:
-        row = w.jumps[i, counts[JUMPS]]
-        row[0], row[1], row[2], row[3], row[4], row[5], row[6] = e, counts[ARCS], released, gain, heat, entropy, valid
+    counts[stepper.EVENTS] += 1
+    if counts[stepper.JUMPS] < w.jumps.shape[1]:
+        row = w.jumps[i, counts[stepper.JUMPS]]
+        row[0], row[1], row[6] = e, counts[stepper.ARCS], valid
+        row[2], row[3], row[4], row[5] = released, gain, heat, entropy
         for k in range(given):
             row[7 + k] = w.totals_after[2 + k] - w.totals_before[2 + k]
         copy(w.moment, row[7 + given :])
         copy(w.after, row[7 + given + w.moment.shape[0] :])
-    counts[JUMPS] += 1
+    counts[stepper.JUMPS] += 1
 
 
 @compiled
 def jump(w: Any, i: int, e: int) -> bool:
     """Carry out an edge: reset, distribute heat, test the second law, update the ledger. False if left to Instant."""
-    n, t, source, measure = w.n, w.moment[0], w.edges[e, HEAT_SOURCE], w.edges[e, MEASURE]
+    n, t, source, measure = w.n, w.moment[0], w.edges[e, stepper.HEAT_SOURCE], w.edges[e, stepper.MEASURE]
     rounding = GUARD_EPS * w.magnitude[w.n_margins - w.edges.shape[0] + e]
     if w.code[TOTALS, 0] == 0:
         return False
@@ -279,19 +260,18 @@ def jump(w: Any, i: int, e: int) -> bool:
     small = RUN_EPS * max(abs(before[1]), abs(now[1]), abs(entropy)) + FEW_EPS * before[-1] + abs(varied[1] - before[1])
     # Entropy production is not negative, up to roundoff and the uncertainty of the heat.
     admissible = gain >= -small - abs(varied[0] - before[0]) / _coldest(w)
-    if not finite(w.after) or (w.edges[e, REFUSES] == 1 and not admissible):
+    if not finite(w.after) or (w.edges[e, stepper.REFUSES] == 1 and not admissible):
         return False
-    _write_event(w, i, e)
-    _write_jump(w, i, e, released, gain, heat, entropy, admissible)
+    _write(w, i, e, released, gain, heat, entropy, admissible)
     _add_to_ledger(w, released, gain, heat, entropy)
     copy(w.after, w.moment)
     for k in range(w.jump_times.shape[0] - 1):
         w.jump_times[k] = w.jump_times[k + 1]
     w.jump_times[-1] = t
-    if w.edges[e, RETURNS] >= 0:
+    if w.edges[e, stepper.RETURNS] >= 0:
         evaluate_at(w, TIMES_OF_RETURN, w.after, w.margin_slope)
         w.rebound_time, w.flight_time = t, -np.inf
         for k in range(w.edges.shape[0]):
-            if w.edges[k, RETURNS] >= 0:
-                w.flight_time = max(w.flight_time, w.margin_slope[w.edges[k, RETURNS]])
+            if w.edges[k, stepper.RETURNS] >= 0:
+                w.flight_time = max(w.flight_time, w.margin_slope[w.edges[k, stepper.RETURNS]])
     return True

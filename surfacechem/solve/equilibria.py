@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -79,6 +80,11 @@ def compiled(system: System, expressions: Iterable[Expression]) -> Function:
     return compile_function(system.inputs, [system.expand(item) for item in expressions])
 
 
+def formulas(expressions: Callable[[Any], Iterable[Expression]]) -> cached_property[Function]:
+    """Return an attribute: the function for expressions of its owner, which has a system, compiled on first use."""
+    return cached_property(lambda owner: compiled(owner.system, expressions(owner)))
+
+
 @dataclass(frozen=True)
 class GapDirection:
     """A direction in the space of the gaps, the gap that measures the distance, and the weights of the tractions."""
@@ -129,21 +135,18 @@ class Equilibria:
         self.followers = [1 + self.states.index(name) for name in system.followers]
         """Columns among the inputs of the states that follow the normal gap where it jumps."""
 
-    @cached_property
-    def _balance(self) -> Function:
-        """Driving traction and size of its terms, for each gap; compiled separately for searches over many rows."""
-        return compiled(self.system, (item for e in self.items for item in (e.residual, e.size)))
+    _balance = formulas(lambda self: (item for e in self.items for item in (e.residual, e.size)))
+    """Driving traction and size of its terms, for each gap; compiled separately for searches over many rows."""
+    _friction_limits = formulas(lambda self: (e.limit for e in self.items))
+    """Friction limit of each gap [Pa]."""
+    _follow = formulas(lambda self: self.system.followers.values())
+    """States that follow the normal gap where it jumps."""
 
     @cached_property
     def _moving(self) -> Function:
         """For each gap: zero if it is held, and the change of each state with it."""
         rows = ([e.active, *(e.coupled.get(name, int(name == e.state)) for name in self.states)] for e in self.items)
         return compiled(self.system, (item for row in rows for item in row))
-
-    @cached_property
-    def _friction_limits(self) -> Function:
-        """Friction limit of each gap [Pa]."""
-        return compiled(self.system, (e.limit for e in self.items))
 
     @cached_property
     def _tangents(self) -> Function:
@@ -155,11 +158,6 @@ class Equilibria:
             slope = derivative(residual, symbols[e.state]) + sum(with_it)
             found += [residual, slope, derivative(residual, self.system.t)]
         return compiled(self.system, found)
-
-    @cached_property
-    def _follow(self) -> Function:
-        """States that follow the normal gap where it jumps."""
-        return compiled(self.system, self.system.followers.values())
 
     # -- gaps along a line ----------------------------------------------------------------------------------------
 

@@ -116,11 +116,6 @@ class Arc:
     ledger_start: Array
     """Ledger at its start."""
 
-    @property
-    def is_whole(self) -> bool:
-        """True if it begins at time zero and no jump comes before it."""
-        return not (self.start.t or self.ledger_start.any())
-
 
 class Hybrid:
     """One run of a system with edges."""
@@ -358,9 +353,13 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
     last = results[-1]
     segments = np.array([*(arc.start.t for arc in arcs), problem.segments[-1]])
     problem = replace(problem, segments=segments, parameters=np.array([arc.start.parameters for arc in arcs]))
-    if len(arcs) == 1 and arcs[0].is_whole:
-        return last._replace(problem=problem, status=status, t=end, ledger=ledger, times=arcs[0].times)
-    events = _rows([(arc, arc.result.events, slice(None)) for arc in arcs])
+    *events, _ = _points(arcs, [result.events for result in results])
+    steps = None
+    if problem.record_steps:
+        t, y, ydot, rows, number = _points(arcs, [result.steps for result in results])
+        # The start of an arc, and a step too short to change the time, repeat the event that ended the last arc.
+        kept = (t > segments[number]) | (number == 0)
+        steps = Points(t[kept], y[kept], ydot[kept], rows[kept], segment=number[kept])
     return Result(
         problem=problem,
         status=status,
@@ -374,7 +373,7 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
         ledger_outputs=np.concatenate([arc.ledger_start + arc.result.ledger_outputs for arc in arcs]),
         events=Events(*events, index=np.concatenate([result.events.index for result in results])),
         counters=Counters(*map(sum, zip(*(result.counters for result in results), strict=True))),
-        steps=_steps(arcs),
+        steps=steps,
         stepping=sum((result.stepping for result in results), 0.0),
         segment=np.repeat(np.arange(len(arcs)), [len(arc.times) for arc in arcs]),
         known=_known(arcs),
@@ -398,22 +397,14 @@ def _known(arcs: Sequence[Arc]) -> States | None:
     return States(np.minimum(t[kept], end[number]), y[kept], ledger_start[number] + ledger[kept], number)
 
 
-def _steps(arcs: Sequence[Arc]) -> Points | None:
-    """Return the steps of all arcs, each with the number of its arc, if they are recorded."""
-    if not arcs[0].result.problem.record_steps:
-        return None
-    taken = [(arc, arc.result.steps) for arc in arcs if arc.result.steps is not None]
-    # The start of an arc, and a step too short to change the time, repeat the event that ended the last arc.
-    kept = [(arc, some, (arc.start.t + some.t > arc.start.t) | (arc is arcs[0])) for arc, some in taken]
-    counts = [int(keep.sum()) for _, _, keep in kept]
-    return Points(*_rows(kept), segment=np.repeat(np.arange(len(counts)), counts))
-
-
-def _rows(found: Sequence[tuple[Arc, Points, slice | NDArray[np.bool_]]]) -> tuple[Array, Array, Array, Array]:
-    """Return times, states, rates and ledgers of the kept points of each arc, in the time and ledger of the run."""
+def _points(arcs: Sequence[Arc], parts: Sequence[Points | None]) -> tuple[Array, Array, Array, Array, Index]:
+    """Return times, states, rates and ledgers of points of the arcs, in the time and ledger of the run, and the number
+    of the arc of each.
+    """
     rows = [
-        (arc.start.t + points.t[keep], points.y[keep], points.ydot[keep], arc.ledger_start + points.ledger[keep])
-        for arc, points, keep in found
+        (arc.start.t + part.t, part.y, part.ydot, arc.ledger_start + part.ledger, np.full(len(part.t), k))
+        for k, (arc, part) in enumerate(zip(arcs, parts, strict=True))
+        if part is not None
     ]
-    t, y, ydot, ledger = map(np.concatenate, zip(*rows, strict=True))
-    return t, y, ydot, ledger
+    t, y, ydot, ledger, number = map(np.concatenate, zip(*rows, strict=True))
+    return t, y, ydot, ledger, number

@@ -25,7 +25,7 @@ from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.system import System
 from surfacechem.solve.branches import zero
 from surfacechem.solve.contract import HEAT_STEPS, Array, Mask
-from surfacechem.solve.equilibria import Equilibria, GapDirection, Heat, Point, compiled
+from surfacechem.solve.equilibria import Equilibria, GapDirection, Heat, Point, compiled, formulas
 from surfacechem.tolerances import ULPS
 
 Moments = Callable[[Array, Array], tuple[Array, Array]]
@@ -237,9 +237,7 @@ class LoadPath:
         expressions = [e.residual for e in self.equilibria.items] + [s.share for s in self.system.sinks[INTERFACE]]
         return any(self.system.expand(x).free_symbols & hot for x in expressions)
 
-    @cached_property
-    def _guards(self) -> Function:
-        return compiled(self.system, (edge.guard for edge in self.system.edges))
+    _guards = formulas(lambda self: (edge.guard for edge in self.system.edges))
 
     def reach(self, index: int, step: LoadStep, before: Point) -> None:
         """Advance along the path of the loads to where an edge that follows from them is carried out."""

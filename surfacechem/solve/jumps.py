@@ -22,7 +22,7 @@ from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import START, System
 from surfacechem.quantities import VELOCITIES
 from surfacechem.solve.contract import Array, EdgeTables, integers
-from surfacechem.solve.equilibria import BALANCED, Equilibria, FoldPoint, Folds, Point, compiled
+from surfacechem.solve.equilibria import BALANCED, Equilibria, FoldPoint, Folds, Point, compiled, formulas
 from surfacechem.solve.jump_heat import JumpHeat, LoadPath, LoadStep
 from surfacechem.solve.radau.stepper import (
     BONDS,
@@ -160,10 +160,12 @@ class Jumper:
         guards = [m.expression for m in system.event_margins] + [edge.guard for edge in system.edges]
         return [magnitude(system.expand(guard), known) for guard in guards]
 
-    @cached_property
-    def times_of_return(self) -> Function:
-        """Times of flight [s] of rebounds."""
-        return compiled(self.system, (edge.return_time for edge in self.system.edges if edge.return_time is not None))
+    times_of_return = formulas(lambda self: (e.return_time for e in self.system.edges if e.return_time is not None))
+    """Times of flight [s] of rebounds."""
+    _energy = formulas(lambda self: [self.system.jump_energy])
+    """Energy that a jump conserves; compiled separately, as a search evaluates it at many rows."""
+    _far_fields = formulas(lambda self: (item for pull in self.system.far_fields.values() for item in pull))
+    """Stiffness, displacement and traction of the far field, and the gap, for each direction."""
 
     @cached_property
     def _resets(self) -> list[Function]:
@@ -205,16 +207,6 @@ class Jumper:
         found = self._total_functions(rows)
         found[..., -2:] = np.where(np.isfinite(found[..., -2:]), found[..., -2:], 0.0)
         return found
-
-    @cached_property
-    def _energy(self) -> Function:
-        """Energy that a jump conserves; compiled separately, as a search evaluates it at many rows."""
-        return compiled(self.system, [self.system.jump_energy])
-
-    @cached_property
-    def _far_fields(self) -> Function:
-        """Stiffness, displacement and traction of the far field, and the gap, for each direction."""
-        return compiled(self.system, (item for pull in self.system.far_fields.values() for item in pull))
 
     def _far_field(self, point: Point) -> Array:
         """Return stiffness, displacement, traction and gap, each by direction, shape (4, directions)."""

@@ -191,9 +191,7 @@ class Trajectory:
         """Return the trajectory with these states as outputs."""
         t, y, ledger, segment = rows
         result = self.result._replace(times=t, outputs=y, ledger_outputs=ledger, segment=segment)
-        found = Trajectory(
-            self.model, self.run, result, self.values, self.status, self.reason, self.seconds, self.jumps
-        )
+        found = replace(self, result=result)
         vars(found).update({name: known for name, known in vars(self).items() if name == "_at_steps"})
         return found
 
@@ -591,10 +589,10 @@ class Model:
     def _guards(self) -> tuple[Guard, ...]:
         """Event types of the limits, followed by those of the guards of edges."""
         limits = (
-            Guard.peak() if m.peak else replace(Guard.stop(), domain=m.domain) if m.terminal else Guard.restart()
+            Guard(terminal=True, domain=m.domain) if m.terminal else Guard(terminal=False, direction=0, smooth=m.peak)
             for m in self.margins
         )
-        return (*limits, *(Guard.bear() if edge.strict else Guard.stop() for edge in self.system.edges))
+        return (*limits, *(Guard(terminal=True, strict=edge.strict) for edge in self.system.edges))
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
         """Run the model.

@@ -119,10 +119,10 @@ class Guards:
         across = np.where(self.strict, now < -FORMULA_EPS * self.largest, now * self.sides <= 0.0)
         return across & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
 
-    def at_zero(self, active: NDArray[np.bool_]) -> list[int]:
-        """Return the kinks that have come to zero within roundoff, in a direction that counts."""
+    def at_zero(self, now: Array, active: NDArray[np.bool_]) -> list[int]:
+        """Return the kinks that these values have brought to zero within roundoff, in a direction that counts."""
         counts = active & ~self.limits & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
-        near = np.isfinite(self.largest) & (np.abs(self.now) <= FORMULA_EPS * self.largest)
+        near = np.isfinite(self.largest) & (np.abs(now) <= FORMULA_EPS * self.largest)
         return np.flatnonzero(counts & near).tolist()
 
     def fallen(self, now: Array) -> NDArray[np.bool_]:

@@ -1,13 +1,14 @@
 """SciPy's LSODA, BDF and Radau under the contract."""
 
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from scipy.integrate import BDF, LSODA, OdeSolver, Radau
 
 from surfacechem.solve.adapters.dense_step import DenseStep, Steps
-from surfacechem.solve.adapters.stepping import Method, NoStateError, StepError, SteppingSolver, View
+from surfacechem.solve.adapters.stepping import Method, NoStateError, SingleSteps, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array, Counters
 from surfacechem.tolerances import EPS
 
@@ -17,11 +18,9 @@ SMALLEST_RTOL = 100 * EPS
 """Smallest relative tolerance of SciPy, which raises smaller ones to it with a warning."""
 
 
-class _Stretch(Method):
-    """Steps with the time counted from their start: a fast transient may be over before the time of the run changes."""
-
+class _Stretch(SingleSteps):
     def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array) -> None:
-        self.start, self.t, self.end, self.most = t, t, end, view.problem.max_steps
+        super().__init__(view.problem.max_steps, t, end)
         self.failure: Exception | None = None
         options: dict[str, Any] = {
             "rtol": max(view.problem.rtol, SMALLEST_RTOL),
@@ -47,19 +46,12 @@ class _Stretch(Method):
             raise self.failure
         return Steps.of(steps)
 
-    def advance(self) -> DenseStep:
-        before, taken = self.t, 0
-        while self.t == before:
-            passed, taken = self.solver.t, self.counted(taken)
-            self._step()
-            if not self.solver.t > passed:  # some methods would repeat such steps endlessly
-                raise StepError("the step size fell to zero")
-            self.t = self.end if self.solver.status == "finished" else self.start + float(self.solver.t)
+    def dense(self) -> Callable[[float], Array]:
         inside, start, end, last = self.solver.dense_output(), self.start, self.t, self.solver.y.copy()
         # The time of the run may round to before the library's last step.
-        return DenseStep(before, end, lambda t: np.asarray(last if t == end else inside(max(t - start, inside.t_old))))
+        return lambda t: np.asarray(last if t == end else inside(max(t - start, inside.t_old)))
 
-    def _step(self) -> None:
+    def step(self) -> float:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             try:
@@ -68,6 +60,7 @@ class _Stretch(Method):
                 raise StepError(str(error)) from error
         if self.solver.status == "failed":
             raise StepError(str(message))
+        return float(self.solver.t)
 
     @property
     def counters(self) -> Counters:

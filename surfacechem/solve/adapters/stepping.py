@@ -4,7 +4,6 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,27 +87,48 @@ class View(Evaluation):
 class Method(ABC):
     """One library method running over one interval without breakpoints."""
 
-    most: int
-    """Most steps without a change of the run's time."""
-
-    def counted(self, taken: int) -> int:
-        """Count a step without a change of the run's time; raise StepError if there are too many."""
-        if taken >= self.most:
-            raise StepError(f"more than {self.most} steps without a change of the time in its last digit")
-        return taken + 1
-
     @abstractmethod
-    def advance(self) -> DenseStep:
-        """Take one step, of the size that the library chooses."""
-
-    def several(self, _most: int) -> Steps:
+    def several(self, most: int) -> Steps:
         """Take at least one step, and up to this many if the dense output of earlier steps remains available."""
-        return Steps.of([self.advance()])
 
     @property
     def counters(self) -> Counters:
         """Matrices factored, Jacobians formed and steps rejected so far, where the library tells."""
         return Counters()
+
+
+class SingleSteps(Method):
+    """Steps with time counted from their start: a fast transient may be over before the time of the run changes."""
+
+    def __init__(self, most: int, start: float, end: float) -> None:
+        self.most = most
+        """Most steps without a change of the run's time."""
+        self.start, self.t, self.end = start, start, end
+        self.passed = 0.0
+        """Time since the start [s]."""
+
+    @abstractmethod
+    def step(self) -> float:
+        """Take one step, of the size that the library chooses; return the time since the start at its end [s]."""
+
+    @abstractmethod
+    def dense(self) -> Callable[[float], Array]:
+        """Return the variables in the last step as a function of the time of the run."""
+
+    def several(self, most: int) -> Steps:
+        return Steps.of([self.advance()])
+
+    def advance(self) -> DenseStep:
+        """Take steps until the time of the run changes."""
+        before, taken = self.t, 0
+        while self.t == before:
+            if taken >= self.most:
+                raise StepError(f"more than {self.most} steps without a change of the time in its last digit")
+            last, self.passed, taken = self.passed, self.step(), taken + 1
+            if not self.passed > last:  # some methods would repeat such steps endlessly
+                raise StepError("the step size fell to zero")
+            self.t = self.end if self.passed >= self.end - self.start else self.start + self.passed
+        return DenseStep(before, self.t, self.dense())
 
 
 class SteppingSolver(Solver):
@@ -128,9 +148,9 @@ class SteppingSolver(Solver):
     def solve(self, problem: Problem) -> Result:
         run, status = _Run(self, problem), Status.FINISHED
         for parameters, end in zip(problem.parameters, problem.segments[1:], strict=True):
-            run.enter(parameters)
+            run.enter(parameters, float(end))
             try:
-                status = run.through_segment(float(end))
+                status = run.through_segment()
             except NoStateError:
                 status = Status.NO_CONSISTENT_STATE
             except StepError:
@@ -142,57 +162,25 @@ class SteppingSolver(Solver):
 
 
 @dataclass(frozen=True)
-class _Along:
-    """Values along consecutive steps: at the start of the first, and at the nodes of each except its start."""
-
-    start: Array
-    rows: Array
-    """[step, node, ...]"""
-
-    @property
-    def ends(self) -> Array:
-        """Values at the ends of the steps; a copy, since a view would keep all nodes in memory."""
-        return self.rows[:, -1].copy()
-
-    def starts(self) -> Array:
-        """Return the values at the starts of the steps."""
-        return np.concatenate((self.start[None], self.rows[:-1, -1]))
-
-    def part(self, first: int, end: int) -> "_Along":
-        """Return the values along some of the steps."""
-        return _Along(self.rows[first - 1, -1] if first else self.start, self.rows[first:end])
-
-    def within(self, k: int) -> Array:
-        """Return the values at all nodes of one step."""
-        one = self.part(k, k + 1)
-        return np.vstack((one.start, one.rows[0]))
-
-    def integral(self, sizes: Array) -> Array:
-        """Return the integral of these rates over steps of these sizes."""
-        return sizes[:, None] * (WEIGHTS[1:] @ self.rows + WEIGHTS[0] * self.starts())
-
-
-@dataclass(frozen=True)
 class _Inside:
-    """State, rates, ledger rates and margins at the quadrature points of consecutive steps."""
+    """Variables at the quadrature points of consecutive steps, [step, node, ...]."""
 
     times: Array
     """Start of the first step and ends of all [s]."""
-    y: _Along
-    ydot: _Along
-    ledger: _Along
+    y: Array
+    ydot: Array
+    ledger: Array
     """Rates of the ledger."""
-    margins: _Along
-
-    @cached_property
-    def sizes(self) -> Array:
-        """Lengths of the steps [s]."""
-        return np.diff(self.times)
+    margins: Array
 
     def part(self, first: int, end: int) -> "_Inside":
         """Return those of some of the steps."""
-        along = (each.part(first, end) for each in (self.y, self.ydot, self.ledger, self.margins))
-        return _Inside(self.times[first : end + 1], *along)
+        rows = (each[first:end] for each in (self.y, self.ydot, self.ledger, self.margins))
+        return _Inside(self.times[first : end + 1], *rows)
+
+    def integral(self, rates: Array) -> Array:
+        """Return the integral of these rates over each step."""
+        return np.diff(self.times)[:, None] * (WEIGHTS[1:] @ rates[:, 1:] + WEIGHTS[0] * rates[:, 0])
 
 
 class _Run:
@@ -227,12 +215,13 @@ class _Run:
         self.aim: float | None = None
         """Expected time of an event that the library's step has passed over: the next steps end there."""
 
-    def enter(self, parameters: Array) -> None:
-        """Begin a segment."""
-        self.view = View(self.problem, parameters, self.y)
+    def enter(self, parameters: Array, end: float) -> None:
+        """Begin a segment that ends at this time [s]."""
+        self.view, self.end = View(self.problem, parameters, self.y), end
 
-    def through_segment(self, end: float) -> Status:
-        """Integrate to the end of a segment, restarting the library after each event."""
+    def through_segment(self) -> Status:
+        """Integrate to the end of the segment, restarting the library after each event."""
+        end = self.end
         while self.t < end:
             start = self.t
             y, ydot = self.view.complete(start, self.y[self.view.differential])
@@ -289,7 +278,7 @@ class _Run:
             inside = self._inside(steps, min(float(steps.times[-1]), end))
             first, count = 0, len(steps.times) - 1
             while first < count:
-                margins = inside.margins.rows[first:]
+                margins = inside.margins[first:, 1:]
                 far = self.guards.far(margins, self.active) if self.problem.margins else count - first
                 if far:
                     self._accept(steps.since(first), inside.part(first, first + far))
@@ -306,11 +295,11 @@ class _Run:
         # Simultaneous zeros differ by the error of the library's polynomial.
         resolution = min(self.problem.rtol, SQRT_EPS) * (within.end - self.t) + ULPS * abs(within.end)
         reached, fired = first_crossing(within, self.guards, self.active, resolution)
-        if reached == end and (self.problem.continued or end < self.problem.segments[-1]):
-            # The next segment cannot tell on which side of zero a kink was.
-            fired = fired or self.guards.at_zero(self.active)
         if reached < within.end:
             inside = self._inside(Steps.of([step]), reached)
+        if reached == self.end and (self.problem.continued or reached < self.problem.segments[-1]):
+            # The next segment cannot tell on which side of zero a kink was.
+            fired = sorted({*fired, *self.guards.at_zero(inside.margins[-1, -1], self.active)})
         if fired and self.aim is None and not self._adds_up(inside, MAX_DEFECT)[0]:
             self.aim = reached
             return []
@@ -319,8 +308,9 @@ class _Run:
 
     def _accept(self, step: Callable[[int], DenseStep], inside: _Inside, fired: Sequence[int] = ()) -> None:
         """Move on to the end of these steps, and store their outputs and events."""
-        times, y, ydot = inside.times, inside.y.ends, inside.ydot.ends
-        gains = inside.ledger.integral(inside.sizes)
+        # Copies, since a view would keep all nodes in memory.
+        times, y, ydot = inside.times, inside.y[:, -1].copy(), inside.ydot[:, -1].copy()
+        gains = inside.integral(inside.ledger)
         # Quadrature is the only value of accounts that the library does not integrate.
         relied = np.ones(len(y), bool) if step(0).ledger is None else self._adds_up(inside, NEGLIGIBLE)
         for k in np.flatnonzero(~relied).tolist():
@@ -332,7 +322,7 @@ class _Run:
         if self.aim is not None and self.aim <= self.t:
             self.aim = None
         self.t, self.y, self.ydot, self.ledger = float(times[-1]), y[-1], ydot[-1], ledgers[-1]
-        self.ledger_rates, self.margins = inside.ledger.ends[-1], inside.margins.ends[-1]
+        self.ledger_rates, self.margins = inside.ledger[-1, -1].copy(), inside.margins[-1, -1].copy()
         self.view.guess = self.y[self.view.algebraic]
         self.count += len(y)
         if self.problem.record_steps:
@@ -352,7 +342,7 @@ class _Run:
             start, end = times[k : k + 2].tolist()
             ledger = ledgers[k + 1]
             if t < end:
-                gain = gained_at((t - start) / (end - start), inside.ledger.within(k)) * (end - start)
+                gain = gained_at((t - start) / (end - start), inside.ledger[k]) * (end - start)
                 ledger = ledgers[k] + (gain if relied[k] else self._gained(step(k), start, t, gain))
             row = np.concatenate((self._state(step(k), t)[0], ledger))
             if not np.all(np.isfinite(row)):
@@ -378,9 +368,12 @@ class _Run:
             y = np.empty((len(x), len(self.y)))
             y[:, view.free], y[:, view.algebraic] = x, view.guess
         rows = view.many(times.ravel(), y)
-        starts = (self.y, self.ydot, self.ledger_rates, self.margins)
-        along = (_Along(start, each.reshape(*times.shape, -1)) for start, each in zip(starts, rows, strict=True))
-        return _Inside(ends, *along)
+        starts, found = (self.y, self.ydot, self.ledger_rates, self.margins), []
+        for start, each in zip(starts, rows, strict=True):
+            nodes = each.reshape(*times.shape, -1)
+            before = np.concatenate((start[None], nodes[:-1, -1]))
+            found.append(np.concatenate((before[:, None], nodes), axis=1))
+        return _Inside(ends, *found)
 
     def _state(self, step: DenseStep, t: float) -> tuple[Array, Array]:
         """Return state and derivatives inside the last step."""
@@ -411,8 +404,8 @@ class _Run:
 
         It finds peaks inside a step, which a test at its end alone misses.
         """
-        ends, starts = inside.y.ends, inside.y.starts()
-        missed = np.abs(inside.ydot.integral(inside.sizes) - (ends - starts))
+        starts, ends = inside.y[:, 0], inside.y[:, -1]
+        missed = np.abs(inside.integral(inside.ydot) - (ends - starts))
         sizes = self.problem.rtol * np.maximum(np.abs(ends), np.abs(starts)) + self.problem.atol
         return np.asarray(np.all((missed <= factor * sizes)[:, self.view.differential], axis=1))
 

@@ -1,6 +1,7 @@
 """SUNDIALS' CVODE and IDA under the contract, through scikit-sundae."""
 
 import os
+from collections.abc import Callable
 from contextlib import redirect_stdout
 from typing import Any
 
@@ -8,8 +9,7 @@ import numpy as np
 from sksundae.cvode import CVODE
 from sksundae.ida import IDA
 
-from surfacechem.solve.adapters.dense_step import DenseStep
-from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
+from surfacechem.solve.adapters.stepping import Method, SingleSteps, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array, Problem
 from surfacechem.tolerances import RUN_EPS
 
@@ -19,14 +19,12 @@ NAMES = ("cvode", "ida")
 os.environ.setdefault("SUNLOGGER_WARNING_FILENAME", os.devnull)
 
 
-class _Stretch(Method):
-    """Single steps of either library, with time counted from their start; dense output is a step back."""
+class _Stretch(SingleSteps):
+    """Single steps of either library; dense output is a step back."""
 
     def __init__(self, library: Any, most: int, t: float, end: float, *start: Array) -> None:
-        self.integrator, self.most = library, most
-        self.start, self.t, self.end = t, t, end
-        self.before, self.passed, self.length = 0.0, 0.0, end - t
-        self.x = start[0]
+        super().__init__(most, t, end)
+        self.integrator, self.x, self.before = library, start[0], 0.0
         self._call(lambda: library.init_step(0.0, *start))
 
     def _call(self, action: Any) -> Any:
@@ -42,29 +40,23 @@ class _Stretch(Method):
             raise StepError(str(answer.message))
         return answer
 
-    def advance(self) -> DenseStep:
-        before, taken = self.t, 0
-        while self.t == before:
-            taken = self.counted(taken)
-            self._step()
-            self.t = self.end if self.passed >= self.length else self.start + self.passed
-        return DenseStep(before, self.t, self._at)
-
-    def _step(self) -> None:
-        self.before = self.passed
+    def step(self) -> float:
+        self.before, length, passed = self.passed, self.end - self.start, self.passed
         # After an interpolation the first call only returns to the end of the last step.
         for _attempt in range(2):
-            answer = self._call(lambda: self.integrator.step(self.length, method="onestep", tstop=self.length))
-            self.passed, self.x = float(answer.t), np.array(answer.y)
-            if self.passed > self.before:
-                return
-        raise StepError("the step size fell to zero")
+            if passed == self.before:
+                answer = self._call(lambda: self.integrator.step(length, method="onestep", tstop=length))
+                passed, self.x = float(answer.t), np.array(answer.y)
+        return passed
+
+    def dense(self) -> Callable[[float], Array]:
+        return self._at
 
     def _at(self, t: float) -> Array:
         since = max(t - self.start, self.before)  # the time of the run may round to before this step
         if t >= self.t or since >= self.passed:  # beyond the end by roundoff, where the library would take another step
             return self.x
-        answer = self._call(lambda: self.integrator.step(since, method="normal", tstop=self.length))
+        answer = self._call(lambda: self.integrator.step(since, method="normal", tstop=self.end - self.start))
         if not abs(answer.t - since) <= RUN_EPS * since:
             raise StepError(f"asked for t = {t}, given t = {self.start + answer.t}")
         return np.array(answer.y)

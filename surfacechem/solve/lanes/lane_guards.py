@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.lanes.lane_step import larger, put_end, put_inside, smaller
+from surfacechem.solve.lanes.lane_step import larger, put_inside, smaller
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, put_where, same, where
 from surfacechem.solve.radau.explicit import DENSEST
 from surfacechem.solve.radau.guards import is_limit
@@ -82,7 +82,9 @@ def may_cross(w: Any, good: Any) -> Any:
     for quarter in range(3):
         w.put_roughly(w, 0.25 * (quarter + 1))
         evaluate(w, MARGINS, w.margin_quarters[quarter])
-    put_end(w)
+    put(w.inputs[0], lanes(w.t) + lanes(w.h))
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y_new[m]))
     evaluate(w, MARGINS, w.margin_end)
     close = same(0.0)
     for m in range(w.n_margins):

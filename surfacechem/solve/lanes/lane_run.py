@@ -4,22 +4,34 @@ A lane whose run has ended takes the next one. Runs that need more (stiffness, g
 rates that are not finite, noise) end with status LEFT and are repeated by the stepper for single runs.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.contract import Status
-from surfacechem.solve.lanes import lane_step
 from surfacechem.solve.lanes.lane_guards import ends_on_guard, find_crossings, may_cross, start_margins
 from surfacechem.solve.lanes.lane_step import (
-    check_inside,
+    END_STAGE,
+    check_outputs,
+    find_defects,
+    find_stiff,
+    first_defect,
+    interpolate,
+    is_noise,
+    keep_step,
     larger,
     needs_checks,
     norm_of,
+    prepare_checks,
+    propose_size,
+    put_roughly,
     put_start,
+    root_of,
     set_weights,
     smaller,
+    try_step,
 )
 from surfacechem.solve.lanes.layout import EXPLICIT_MEMORY, NUMBERS, ORDER, SIZES
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, put_where, same, where
@@ -285,14 +297,6 @@ def _go_on(w: Any, lane: int) -> None:
 
 
 @compiled
-def _look_for_guards_anew(w: Any, lane: int) -> None:
-    """Go on by whole steps: if a step onto a guard fails, the step in which that was found has misled."""
-    w.landing[lane] = 0
-    for m in range(w.n_margins):
-        w.fired[m, lane] = 0.0
-
-
-@compiled
 def _conclude(w: Any, lane: int) -> None:
     """Decide about a trial step that may not be accepted as it is: repeat it, shorter or onto a guard, or accept it."""
     h = w.h[lane]
@@ -303,7 +307,10 @@ def _conclude(w: Any, lane: int) -> None:
         w.proposed[lane], w.again[lane] = w.following[lane], 1.0
         w.failed[lane] += 1
         w.rejected[lane] += 1
-        _look_for_guards_anew(w, lane)
+        # If this was a step onto a guard, the step in which that was found has misled: go on by whole steps.
+        w.landing[lane] = 0
+        for m in range(w.n_margins):
+            w.fired[m, lane] = 0.0
     elif w.defect_at[lane] < 1.0:
         # End a step there, so that its last stage sees what the other stages have missed.
         w.aim[lane], w.proposed[lane] = w.t[lane] + w.defect_at[lane] * h, w.defect_at[lane] * h
@@ -384,7 +391,7 @@ def _step(w: Any) -> None:
     put(w.t_new, where(lanes(w.last) > 0.5, lanes(w.end), lanes(w.t) + lanes(w.h)))
     set_weights(w)
     w.try_step(w)
-    w.propose(w)
+    w.propose_size(w)
     good = (lanes(w.norm) < 1.0) & (lanes(w.busy) > 0.5)
     put(w.unclear, 0.0)
     if any_lane(good):
@@ -397,7 +404,11 @@ def _step(w: Any) -> None:
         elif any_lane(close):
             w.interpolate(w, w.n)
         if seen:
-            check_inside(w)
+            prepare_checks(w)
+            # One lane after another, at eight points at once: steps differ in the number of looks that they need.
+            for lane in range(LANES):
+                if w.spacings[lane] >= 0.0:
+                    w.defect_at[lane] = first_defect(w, lane)
         if shown:
             w.check_outputs(w, good)
         find_crossings(w, good & (lanes(w.defect_at) == 1.0), close)
@@ -429,23 +440,22 @@ def run_through(w: Any, first: int, last: int) -> None:
             _step(w)
 
 
-_METHOD = {
-    "end_stage": lane_step.END_STAGE,
-    "root_of": lane_step.eighth_root,
-    "least_root": LEAST_NORM**0.125,
-    "try_step": lane_step.try_step,
-    "propose": lane_step.propose,
-    "is_noise": lane_step.is_noise,
-    "find_stiff": lane_step.find_stiff,
-    "put_roughly": lane_step.put_roughly,
-    "interpolate": lane_step.interpolate,
-    "find_defects": lane_step.find_defects,
-    "check_outputs": lane_step.check_outputs,
-    "keep_step": lane_step.keep_step,
-}
-_lay_out = laying_out(StepperRecord("ExplicitLanes", SIZES, NUMBERS, EXPLICIT_MEMORY, _METHOD))
+def loop_of(name: str, end_stage: int, power: float, memory: Mapping[str, Any], *parts: Any) -> Any:
+    """Return the loop with the steps of a method.
+
+    ``end_stage`` is the row of its rates at the end of a step, ``power`` that of its error from which the next size
+    follows; the ``parts`` are the compiled functions in which methods differ, which the loop calls by their names.
+    """
+    method = {"end_stage": end_stage, "least_root": LEAST_NORM**power, **{part.__name__: part for part in parts}}
+    lay_out = laying_out(StepperRecord(name, SIZES, NUMBERS, memory, method))
+
+    def run(first: int, last: int, memory: Any, batch: Any) -> None:
+        run_through(lay_out(batch, memory), first, last)
+
+    return run
 
 
-def run_explicitly(first: int, last: int, memory: Any, batch: Any) -> None:
-    """Solve runs first to last - 1 of a batch."""
-    run_through(_lay_out(batch, memory), first, last)
+_STEPS = root_of, try_step, propose_size, is_noise, find_stiff, keep_step
+_INSIDE = put_roughly, interpolate, find_defects, check_outputs
+run_explicitly = loop_of("ExplicitLanes", END_STAGE, 0.125, EXPLICIT_MEMORY, *_STEPS, *_INSIDE)
+"""Solve runs first to last - 1 of a batch."""

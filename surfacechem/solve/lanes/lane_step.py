@@ -26,6 +26,7 @@ from surfacechem.solve.lanes.vector import (
     square_root,
     where,
 )
+from surfacechem.solve.radau import tables
 from surfacechem.solve.radau.dense import FORESEEN_PART, N_GROUPS, ledger_rtol
 from surfacechem.solve.radau.explicit import (
     DENSEST,
@@ -37,19 +38,10 @@ from surfacechem.solve.radau.explicit import (
     STIFF_STEP,
 )
 from surfacechem.solve.radau.step import CHECK_PART, END_CHECKS, MAX_DEFECT, MAX_GROWTH, MIN_GROWTH, SAFETY
-from surfacechem.solve.radau.tables import (
-    DENSE_FACTORS,
-    EXPLICIT,
-    EXPLICIT_ERRORS,
-    EXPLICIT_NODES,
-    GAMMA,
-    LAST_STAGE,
-    STAGES_OF_DENSE,
-)
 from surfacechem.solve.radau.work import RATES, compiled, evaluate, evaluate_at, weighted_sums
 from surfacechem.tolerances import LOOSE_RTOL, RUN_EPS, TINY
 
-END_STAGE = STAGES_OF_DENSE - 1
+END_STAGE = tables.STAGES_OF_DENSE - 1
 """The last stage, at the end of the step."""
 COUNT = np.arange(LANES, dtype=float)
 _NARROWING = 10.0 ** -np.arange(1, END_CHECKS + 1)
@@ -64,17 +56,17 @@ def _polynomial_table() -> NDArray[np.float64]:
     rates.
     """
     x = Polynomial([0.0, 1.0])
-    table = np.zeros((len(DENSE_FACTORS) + 1, LAST_STAGE + 1))
-    for stage in range(LAST_STAGE + 1):
+    table = np.zeros((len(tables.DENSE_FACTORS) + 1, tables.LAST_STAGE + 1))
+    for stage in range(tables.LAST_STAGE + 1):
         total = Polynomial([0.0])
-        for i, factor in enumerate(DENSE_FACTORS[::-1, stage]):
+        for i, factor in enumerate(tables.DENSE_FACTORS[::-1, stage]):
             total = (total + factor) * (x if i % 2 == 0 else 1.0 - x)
         table[: len(total.coef), stage] = total.coef
     return table[1:]
 
 
-_change = weighted_sums(EXPLICIT, LANES)
-_errors = weighted_sums(EXPLICIT_ERRORS, LANES)
+_change = weighted_sums(tables.EXPLICIT, LANES)
+_errors = weighted_sums(tables.EXPLICIT_ERRORS, LANES)
 _coefficients = weighted_sums(_polynomial_table(), LANES)
 
 
@@ -91,7 +83,7 @@ def smaller(a: Any, b: Any) -> Any:
 
 
 @compiled
-def eighth_root(a: Any) -> Any:
+def root_of(a: Any) -> Any:
     """The eighth root, for step sizes of a method of order 8."""
     return square_root(square_root(square_root(a)))
 
@@ -122,13 +114,24 @@ def norm_of(w: Any, row: Any) -> Any:
 
 
 @compiled
+def error_norm(w: Any, errors: Any) -> Any:
+    """The maximum norm of errors of the states at the end of the step, relative to their tolerances over the step."""
+    norm = same(0.0)
+    for m in range(w.n):
+        largest = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
+        size = absolute(lanes(errors[m])) / larger(w.rtol * largest + w.atol[m], TINY)
+        norm = where(size <= norm, norm, size)  # not larger(): NaN must be seen
+    return norm
+
+
+@compiled
 def _evaluate_stage(w: Any, i: int) -> None:
     """Evaluate the rates of stage i, and the weighted sum of the earlier stages: of the accounts at the end alone."""
     h, columns = lanes(w.h), w.columns if i == END_STAGE else w.n
     # What the last two stages of a step have is kept.
     change = w.change_before if i == END_STAGE - 1 else w.change if i <= END_STAGE else w.rates
     _change(i, w.k.ctypes.data, LANES * w.columns, LANES * columns, change.ctypes.data)
-    put(w.inputs[0], lanes(w.t) + EXPLICIT_NODES[i] * h)
+    put(w.inputs[0], lanes(w.t) + tables.EXPLICIT_NODES[i] * h)
     for m in range(w.n):
         put(w.inputs[1 + m], lanes(w.y[m]) + h * lanes(change[m]))
     evaluate(w, RATES, w.k[i])
@@ -152,7 +155,7 @@ def scale_ledger(w: Any, stages: int) -> None:
 def _ledger_norms(w: Any) -> Any:
     """Error norm of the ledger. Accounts of one kind share a scale."""
     h, norm = lanes(w.h), same(0.0)
-    scale_ledger(w, STAGES_OF_DENSE)
+    scale_ledger(w, tables.STAGES_OF_DENSE)
     for group in range(N_GROUPS):
         miss, second, scale = same(0.0), same(0.0), same(TINY)
         for m in range(w.n_ledger):
@@ -169,7 +172,7 @@ def try_step(w: Any) -> None:
     """Evaluate all stages of a step of each lane, and the norm of its local error."""
     for i in range(1, END_STAGE + 1):
         _evaluate_stage(w, i)
-    put(w.evaluations, lanes(w.evaluations) + float(LAST_STAGE))
+    put(w.evaluations, lanes(w.evaluations) + float(tables.LAST_STAGE))
     h, every = lanes(w.h), LANES * w.columns
     _errors(0, w.k.ctypes.data, every, every, w.coarse.ctypes.data)
     _errors(1, w.k.ctypes.data, every, every, w.fine.ctypes.data)
@@ -190,7 +193,7 @@ def try_step(w: Any) -> None:
 
 
 @compiled
-def propose(w: Any) -> None:
+def propose_size(w: Any) -> None:
     """Propose the size of the next step (Gustafsson 1994), or of the repetition of one that fails."""
     h, h_last, given = lanes(w.h), lanes(w.h_last), lanes(w.norm)
     norm = larger(where(given < 1e30, given, 1e30), RUN_EPS)
@@ -230,7 +233,7 @@ def is_noise(w: Any, lane: int) -> bool:
 @compiled
 def interpolate(w: Any, columns: int) -> None:
     """The polynomials of the steps, of the first so many columns."""
-    for i in range(STAGES_OF_DENSE, LAST_STAGE + 1):
+    for i in range(tables.STAGES_OF_DENSE, tables.LAST_STAGE + 1):
         _evaluate_stage(w, i)
     for d in range(ORDER):
         _coefficients(d, w.k.ctypes.data, LANES * w.columns, LANES * columns, w.polynomial[d].ctypes.data)
@@ -257,14 +260,6 @@ def put_roughly(w: Any, x: float) -> None:
 
 
 @compiled
-def put_end(w: Any) -> None:
-    """Set the inputs to time and state at the end of each step."""
-    put(w.inputs[0], lanes(w.t) + lanes(w.h))
-    for m in range(w.n):
-        put(w.inputs[1 + m], lanes(w.y_new[m]))
-
-
-@compiled
 def differentiate_polynomials(w: Any, columns: int) -> None:
     """Set the coefficients of the slopes of the dense output, of the first so many columns."""
     for d in range(ORDER):
@@ -273,12 +268,12 @@ def differentiate_polynomials(w: Any, columns: int) -> None:
 
 
 @compiled
-def _prepare_checks(w: Any) -> None:
+def prepare_checks(w: Any) -> None:
     """Set the allowed defect of the rate of each column, and the coefficients of the slope of the dense output."""
     h = lanes(w.h)
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        put(w.allowed[m], MAX_DEFECT * GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
+        put(w.allowed[m], MAX_DEFECT * tables.GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
     for m in range(w.n_ledger):
         put(w.allowed[w.n + m], same(np.inf))  # an account without a group only has to be finite
     for group in range(N_GROUPS):
@@ -362,7 +357,7 @@ def needs_checks(w: Any, good: Any) -> bool:
 
 
 @compiled
-def _first_defect(w: Any, lane: int) -> float:
+def first_defect(w: Any, lane: int) -> float:
     """The fraction of the step of a lane where the dense output first misses the equations; one if nowhere.
 
     Looks are denser next to the ends of a load segment and of a step that an event has cut short: a feature there may
@@ -386,18 +381,6 @@ def _first_defect(w: Any, lane: int) -> float:
                 if w.at[j] >= 0.0:
                     return float(w.at[j])
     return 1.0
-
-
-@compiled
-def check_inside(w: Any) -> None:
-    """Check the equations inside each step; keep the fraction where the dense output first misses them, one if nowhere.
-
-    Of one lane after another, at eight points at once: steps differ in the number of looks that they need.
-    """
-    _prepare_checks(w)
-    for lane in range(LANES):
-        if w.spacings[lane] >= 0.0:
-            w.defect_at[lane] = _first_defect(w, lane)
 
 
 @compiled

@@ -18,18 +18,19 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from surfacechem.compile.vectors import LANES
-from surfacechem.solve.lanes.lane_run import run_through
+from surfacechem.solve.lanes import lane_step
+from surfacechem.solve.lanes.lane_run import loop_of
 from surfacechem.solve.lanes.lane_step import (
     differentiate_polynomials,
+    error_norm,
     larger,
-    propose,
     put_inside,
     put_points,
     put_start,
     scale_ledger,
     smaller,
 )
-from surfacechem.solve.lanes.layout import NUMBERS, ORDER, RADAU_MEMORY, SIZES
+from surfacechem.solve.lanes.layout import ORDER, RADAU_MEMORY
 from surfacechem.solve.lanes.vector import (
     absolute,
     any_lane,
@@ -44,8 +45,8 @@ from surfacechem.solve.lanes.vector import (
     square_root,
     where,
 )
+from surfacechem.solve.radau import tables
 from surfacechem.solve.radau.dense import N_GROUPS, ledger_rtol
-from surfacechem.solve.radau.driver import LEAST_NORM
 from surfacechem.solve.radau.explicit import DENSEST
 from surfacechem.solve.radau.linear import PIVOT_PART
 from surfacechem.solve.radau.newton import (
@@ -58,27 +59,13 @@ from surfacechem.solve.radau.newton import (
     TRUST,
 )
 from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
-from surfacechem.solve.radau.record import StepperRecord, laying_out
 from surfacechem.solve.radau.step import CONTRACTING, LEAST_CONVERGENT, MIN_GROWTH, SAFETY
-from surfacechem.solve.radau.tables import (
-    COARSE_RTOL,
-    COLLOCATION,
-    FROM_PARTS,
-    GAMMA,
-    INVERSE,
-    NODES,
-    PAIR_VALUES,
-    PROBE,
-    START_RATE,
-    START_SLOPE,
-    TO_PARTS,
-)
 from surfacechem.solve.radau.work import JACOBIAN, RATES, RESIDUAL, compiled, evaluate, evaluate_at, weighted_sums
 from surfacechem.tolerances import EPS, LOOSE_RTOL, NEGLIGIBLE, TINY
 
 MEMBER, STAGES = 1, 5
 """Member of the family in these steps, and its number of stages."""
-C = NODES[MEMBER, :STAGES]
+C = tables.NODES[MEMBER, :STAGES]
 POWER = 1.0 / (STAGES + 1.0)
 """Exponent of the size of a step: the estimate of s stages goes with h^(s+1)."""
 MOST_ITERATIONS = 9
@@ -86,7 +73,7 @@ DIVERGED = (SAFETY / SHORTENED) ** (1.0 / POWER)
 """Norm assigned to a step without convergence: the next trial is SHORTENED, as in single runs. If that fails
 too, the next ones have a tenth each.
 """
-EIGENVALUES = np.array([GAMMA[MEMBER], *PAIR_VALUES[MEMBER, :2]])
+EIGENVALUES = np.array([tables.GAMMA[MEMBER], *tables.PAIR_VALUES[MEMBER, :2]])
 
 
 def _polynomials() -> list[Polynomial]:
@@ -113,12 +100,12 @@ _polynomial = weighted_sums(_coefficients_of(_polynomials(), ORDER), LANES)
 # The extrapolated change after the end of a step, by its stage rates.
 _after_end = [each(Polynomial([1.0, 1.0])) for each in _polynomials()[1 : 1 + STAGES]]
 _extrapolated = weighted_sums(_coefficients_of(_after_end, STAGES), LANES)
-_to_slopes = weighted_sums(INVERSE[MEMBER, :STAGES, :STAGES], LANES)
-_to_parts = weighted_sums(TO_PARTS[MEMBER, :STAGES, :STAGES], LANES)
-_from_parts = weighted_sums(FROM_PARTS[MEMBER, :STAGES, :STAGES], LANES)
-_start_slope = weighted_sums(START_SLOPE[MEMBER : MEMBER + 1, :STAGES], LANES)
-_weights = weighted_sums(np.array([[0.0, *COLLOCATION[MEMBER, STAGES - 1, :STAGES]]]), LANES)
-_defect_at_start = weighted_sums(np.array([[1.0, *-START_RATE[MEMBER, :STAGES], 0.0]]), LANES)
+_to_slopes = weighted_sums(tables.INVERSE[MEMBER, :STAGES, :STAGES], LANES)
+_to_parts = weighted_sums(tables.TO_PARTS[MEMBER, :STAGES, :STAGES], LANES)
+_from_parts = weighted_sums(tables.FROM_PARTS[MEMBER, :STAGES, :STAGES], LANES)
+_start_slope = weighted_sums(tables.START_SLOPE[MEMBER : MEMBER + 1, :STAGES], LANES)
+_weights = weighted_sums(np.array([[0.0, *tables.COLLOCATION[MEMBER, STAGES - 1, :STAGES]]]), LANES)
+_defect_at_start = weighted_sums(np.array([[1.0, *-tables.START_RATE[MEMBER, :STAGES], 0.0]]), LANES)
 
 
 @compiled
@@ -235,7 +222,7 @@ def solve_of(w: Any, lane: int, x: Any) -> None:
 
 
 @compiled
-def sixth_root(a: Any) -> Any:
+def root_of(a: Any) -> Any:
     """The sixth root, for step sizes of an estimate of order 5."""
     return exponential(POWER * logarithm(a))
 
@@ -342,7 +329,7 @@ def _solve_stages(w: Any) -> Any:
             contraction = where(active, larger(rate / (1.0 - rate), same(SLOWEST_KNOWN)), contraction)
         # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
         met = norm <= ROUNDINGS * _roundoff(w)
-        if iteration > 0 or w.rtol < COARSE_RTOL:
+        if iteration > 0 or w.rtol < tables.COARSE_RTOL:
             met = met | (goes_on & (contraction * norm <= NEWTON_PART))
         solved = solved | (active & met)
         active = active & goes_on & ~met
@@ -378,22 +365,12 @@ def _estimate(w: Any, rates: Any) -> None:
 
 
 @compiled
-def _norm_of_error(w: Any) -> Any:
-    norm = same(0.0)
-    for m in range(w.n):
-        largest = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        size = absolute(lanes(w.error[m])) / larger(w.rtol * largest + w.atol[m], TINY)
-        norm = where(size <= norm, norm, size)
-    return norm / w.loose
-
-
-@compiled
 def _error_norm(w: Any) -> Any:
     """The norm of the local error; filtered twice in a stiff transient, where the first estimate is too large."""
     _estimate(w, w.k[0])
     for m in range(w.n):
         put(w.error[m], lanes(w.rhs[m]))
-    norm = _norm_of_error(w)
+    norm = error_norm(w, w.error) / w.loose
     again = (norm >= 1.0) & ((lanes(w.again) > 0.5) | ~(lanes(w.h_last) > 0.0)) & (lanes(w.h) > 0.0)
     if any_lane(again):
         put(w.inputs[0], lanes(w.t))
@@ -403,7 +380,7 @@ def _error_norm(w: Any) -> Any:
         _estimate(w, w.rates)
         for m in range(w.n):
             put_where(again, w.error[m], lanes(w.rhs[m]))
-        norm = where(again, smaller(norm, _norm_of_error(w)), norm)
+        norm = where(again, smaller(norm, error_norm(w, w.error) / w.loose), norm)
     return norm
 
 
@@ -488,29 +465,23 @@ def try_step(w: Any) -> None:
         for i in range(STAGES):
             _put_slopes(w, i)
     for m in range(w.n):
-        put(w.k[1 + STAGES, m], GAMMA[MEMBER] * lanes(w.error[m]) / lanes(w.h))
+        put(w.k[1 + STAGES, m], tables.GAMMA[MEMBER] * lanes(w.error[m]) / lanes(w.h))
     first = (lanes(w.guess_error) < np.inf) & (lanes(w.again) < 0.5)
     put(w.norm, where(solved, norm, where(first, DIVERGED, np.inf)))
 
 
 @compiled
-def _propose_by_order(w: Any) -> None:
-    """Shorten the repetition of a step that fails again by the order in its size that its error has shown: it is lower
-    than usual in a transient, and where the rate of an account is singular at the start.
-    """
+def propose_size(w: Any) -> None:
+    """Propose the size of the next step: also such that Newton's method contracts well."""
+    lane_step.propose_size(w)
+    # Shorten the repetition of a step that fails again by the order in its size that its error has shown: it is lower
+    # than usual in a transient, and where the rate of an account is singular at the start.
     norm, before = lanes(w.norm), lanes(w.norm_tried)
     fails = (lanes(w.again) > 0.5) & (norm >= 1.0) & (norm < before)
     if any_lane(fails):
         inverse = logarithm(lanes(w.h_tried) / lanes(w.h)) / logarithm(before / norm)
         size = lanes(w.h) * larger(SAFETY * exponential(0.0 - inverse * logarithm(norm)), same(MIN_GROWTH))
         put_where(fails, w.following, smaller(size, lanes(w.following)))
-
-
-@compiled
-def propose_size(w: Any) -> None:
-    """Propose the size of the next step: also such that Newton's method contracts well."""
-    propose(w)
-    _propose_by_order(w)
     h, theta = lanes(w.h), where(lanes(w.guess_error) > 1.0, lanes(w.theta), 0.0)
     convergent = h * larger(square_root(CONTRACTING / theta), same(LEAST_CONVERGENT))
     put(w.following, smaller(lanes(w.following), where(theta > 0.0, convergent, np.inf)))
@@ -575,7 +546,7 @@ def find_defects(w: Any, lane: int, x: Any) -> None:
     if w.n_ledger > 0:
         evaluate_at(w, RATES, inputs, w.rates)
     for m in range(w.n):
-        put(w.rates[m], GAMMA[DENSEST] / w.h[lane] * lanes(w.rhs[m]))
+        put(w.rates[m], tables.GAMMA[DENSEST] / w.h[lane] * lanes(w.rhs[m]))
     for m in range(w.n, w.columns):
         put(w.rates[m], lanes(w.rates[m]) - polynomial_of(w.slope_of, m, lane, x))
 
@@ -585,7 +556,7 @@ def check_outputs(w: Any, good: Any) -> None:
     """End a step at its next output where the polynomial between the stages is less accurate than the step."""
     shown = good & (lanes(w.next_output) < lanes(w.t_new)) & (lanes(w.defect_at) == 1.0)
     differentiate_polynomials(w, w.n)
-    x = same(PROBE[MEMBER])
+    x = same(tables.PROBE[MEMBER])
     put_inside(w, x)
     evaluate(w, RESIDUAL, w.rhs)
     for m in range(w.n):
@@ -607,23 +578,7 @@ def keep_step(w: Any) -> None:
             put_where(taken, w.k_last[i, m], lanes(w.k[1 + i, m]))
 
 
-_METHOD = {
-    "end_stage": STAGES,
-    "root_of": sixth_root,
-    "least_root": LEAST_NORM**POWER,
-    "try_step": try_step,
-    "propose": propose_size,
-    "is_noise": is_noise,
-    "find_stiff": find_stiff,
-    "put_roughly": put_roughly,
-    "interpolate": interpolate,
-    "find_defects": find_defects,
-    "check_outputs": check_outputs,
-    "keep_step": keep_step,
-}
-_lay_out = laying_out(StepperRecord("RadauLanes", SIZES, NUMBERS, RADAU_MEMORY, _METHOD))
-
-
-def run_by_radau(first: int, last: int, memory: Any, batch: Any) -> None:
-    """Solve runs first to last - 1 of a batch."""
-    run_through(_lay_out(batch, memory), first, last)
+_STEPS = root_of, try_step, propose_size, is_noise, find_stiff, keep_step
+_INSIDE = put_roughly, interpolate, find_defects, check_outputs
+run_by_radau = loop_of("RadauLanes", STAGES, POWER, RADAU_MEMORY, *_STEPS, *_INSIDE)
+"""Solve runs first to last - 1 of a batch."""

@@ -14,22 +14,12 @@ from numpy.typing import NDArray
 from surfacechem.compile.rosenbrock import CHANGES, DENSE, STAGES
 from surfacechem.compile.rosenbrock import GAMMA as GAMMA_OF_STAGES
 from surfacechem.compile.vectors import LANES
-from surfacechem.solve.lanes.lane_run import CONSTANTS, run_through
-from surfacechem.solve.lanes.lane_step import keep_step, larger, propose, put_start
-from surfacechem.solve.lanes.layout import NUMBERS, ORDER, ROSENBROCK_MEMORY, SIZES
-from surfacechem.solve.lanes.radau_lanes import (
-    check_outputs,
-    differentiate,
-    factor,
-    is_noise,
-    limit_growth,
-)
-from surfacechem.solve.lanes.radau_lanes import find_defects as find_errors
-from surfacechem.solve.lanes.vector import absolute, exponential, lanes, logarithm, put, same, where
-from surfacechem.solve.radau.driver import LEAST_NORM
-from surfacechem.solve.radau.record import StepperRecord, laying_out
+from surfacechem.solve.lanes import lane_step, radau_lanes
+from surfacechem.solve.lanes.lane_run import CONSTANTS, loop_of
+from surfacechem.solve.lanes.lane_step import error_norm, keep_step, put_start
+from surfacechem.solve.lanes.layout import ORDER, ROSENBROCK_MEMORY
+from surfacechem.solve.lanes.vector import exponential, lanes, logarithm, put, same, where
 from surfacechem.solve.radau.work import compiled, evaluate, weighted_sums
-from surfacechem.tolerances import TINY
 
 STEP = CONSTANTS + 1
 """Row of the code of a step in the table of addresses."""
@@ -56,7 +46,7 @@ _quarters = weighted_sums([[x**d for d in range(1, 1 + ORDER)] @ _POLYNOMIALS fo
 
 
 @compiled
-def fifth_root(a: Any) -> Any:
+def root_of(a: Any) -> Any:
     """The fifth root, for step sizes of an estimate of order 4."""
     return exponential(POWER * logarithm(a))
 
@@ -68,21 +58,16 @@ def try_step(w: Any) -> None:
     put(w.inputs[1 + w.n], lanes(w.h))
     evaluate(w, STEP, w.k)
     put(w.evaluations, lanes(w.evaluations) + float(STAGES))
-    norm = same(0.0)
     for m in range(w.n):
-        end = lanes(w.k[1 + END_STAGE, m])
-        put(w.y_new[m], end)
-        size = w.rtol * larger(absolute(lanes(w.y[m])), absolute(end)) + w.atol[m]
-        error = absolute(lanes(w.k[STAGES, m])) / larger(size, TINY)
-        norm = where(error <= norm, norm, error)  # not larger(): NaN must be seen
-    put(w.norm, norm)
+        put(w.y_new[m], lanes(w.k[1 + END_STAGE, m]))
+    put(w.norm, error_norm(w, w.k[STAGES]))
 
 
 @compiled
 def propose_size(w: Any) -> None:
     """Propose the size of the next step."""
-    propose(w)
-    limit_growth(w)
+    lane_step.propose_size(w)
+    radau_lanes.limit_growth(w)
 
 
 @compiled
@@ -111,8 +96,8 @@ def interpolate(w: Any, columns: int) -> None:
         for m in range(w.n):
             put(w.polynomial[d, m], lanes(w.polynomial[d, m]) * rate)
     put_start(w)
-    differentiate(w)
-    factor(w, 0, rate / GAMMA_OF_STAGES, same(0.0))
+    radau_lanes.differentiate(w)
+    radau_lanes.factor(w, 0, rate / GAMMA_OF_STAGES, same(0.0))
 
 
 @compiled
@@ -120,28 +105,12 @@ def find_defects(w: Any, lane: int, x: Any) -> None:
     """The defects of the dense output as in steps of Radau IIA, but without their loosening, which belongs to an
     estimate of half the order of the step.
     """
-    find_errors(w, lane, x)
+    radau_lanes.find_defects(w, lane, x)
     for m in range(w.n):
         put(w.rates[m], lanes(w.rates[m]) * w.loose)
 
 
-_METHOD = {
-    "end_stage": END_STAGE,
-    "root_of": fifth_root,
-    "least_root": LEAST_NORM**POWER,
-    "try_step": try_step,
-    "propose": propose_size,
-    "is_noise": is_noise,
-    "find_stiff": find_stiff,
-    "put_roughly": put_roughly,
-    "interpolate": interpolate,
-    "find_defects": find_defects,
-    "check_outputs": check_outputs,
-    "keep_step": keep_step,
-}
-_lay_out = laying_out(StepperRecord("RosenbrockLanes", SIZES, NUMBERS, ROSENBROCK_MEMORY, _METHOD))
-
-
-def run_linearly(first: int, last: int, memory: Any, batch: Any) -> None:
-    """Solve runs first to last - 1 of a batch."""
-    run_through(_lay_out(batch, memory), first, last)
+_STEPS = root_of, try_step, propose_size, radau_lanes.is_noise, find_stiff, keep_step
+_INSIDE = put_roughly, interpolate, find_defects, radau_lanes.check_outputs
+run_linearly = loop_of("RosenbrockLanes", END_STAGE, POWER, ROSENBROCK_MEMORY, *_STEPS, *_INSIDE)
+"""Solve runs first to last - 1 of a batch."""

@@ -156,16 +156,6 @@ def where(_context: Any, mask: Any, a: Any, b: Any) -> Any:
     return LANE(mask, a, b), generate
 
 
-@_intrinsic
-def same(_context: Any, value: Any) -> Any:
-    """Broadcast one number to eight lanes."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        return _spread(builder, args[0])
-
-    return LANE(value), generate
-
-
 def _polynomial(context: Any, builder: Any, kind: Any, table: Any, x: Any, load: Callable[[Any], Any]) -> Any:
     """Evaluate a polynomial by Horner's scheme without a loop; ``load`` takes the first entry of a row of the table."""
     array = context.make_array(kind)(context, builder, table)
@@ -217,52 +207,33 @@ def any_lane(_context: Any, mask: Any) -> Any:
     return types.boolean(mask), generate
 
 
-@_intrinsic
-def absolute(_context: Any, value: Any) -> Any:
-    """Absolute values of eight numbers."""
+def _unary(emit: Callable[[Any, Any], Any]) -> Any:
+    """Return a function of one vector."""
 
-    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        sizes = builder.and_(builder.bitcast(args[0], INTEGERS), _Constant(INTEGERS, [2**63 - 1] * LANES))
-        return builder.bitcast(sizes, VECTOR)
+    @_intrinsic
+    def apply(_context: Any, value: Any) -> Any:
+        def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+            return emit(builder, args[0])
 
-    return LANE(value), generate
+        return LANE(value), generate
 
-
-@_intrinsic
-def floor(_context: Any, value: Any) -> Any:
-    """Round eight numbers down to whole numbers."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        return by_vector(builder, "floor", args[0])
-
-    return LANE(value), generate
+    return apply
 
 
-@_intrinsic
-def square_root(_context: Any, value: Any) -> Any:
-    """Square roots of eight numbers."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        return by_vector(builder, "sqrt", args[0])
-
-    return LANE(value), generate
+def _without_sign(builder: Any, value: Any) -> Any:
+    sizes = builder.and_(builder.bitcast(value, INTEGERS), _Constant(INTEGERS, [2**63 - 1] * LANES))
+    return builder.bitcast(sizes, VECTOR)
 
 
-@_intrinsic
-def logarithm(_context: Any, value: Any) -> Any:
-    """Natural logarithms of eight numbers."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        return log(builder, args[0])
-
-    return LANE(value), generate
-
-
-@_intrinsic
-def exponential(_context: Any, value: Any) -> Any:
-    """Exponentials of eight numbers."""
-
-    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        return exp(builder, args[0])
-
-    return LANE(value), generate
+same = _unary(_spread)
+"""Broadcast one number to eight lanes."""
+absolute = _unary(_without_sign)
+"""Absolute values of eight numbers."""
+floor = _unary(lambda builder, value: by_vector(builder, "floor", value))
+"""Round eight numbers down to whole numbers."""
+square_root = _unary(lambda builder, value: by_vector(builder, "sqrt", value))
+"""Square roots of eight numbers."""
+logarithm = _unary(log)
+"""Natural logarithms of eight numbers."""
+exponential = _unary(exp)
+"""Exponentials of eight numbers."""

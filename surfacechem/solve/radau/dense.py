@@ -11,18 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.newton import divide, nested, set_stage, stage_count
-from surfacechem.solve.radau.tables import (
-    COLLOCATION,
-    DEFECT,
-    GAMMA,
-    NEWTON_NODES,
-    NODES,
-    SCAN_RATES,
-    SCAN_VALUES,
-    SCANNED,
-    START_RATE,
-)
+from surfacechem.solve.radau import tables
+from surfacechem.solve.radau.newton import divide, set_stage, stage_count
 from surfacechem.solve.radau.work import LEDGER, combine, compiled, copy, evaluate, finite, put
 from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS, TINY
 
@@ -44,7 +34,7 @@ def _newton_form(k: int, values: Any, correction: Any, result: Any) -> None:
         divide(k, values, m, row)
         row[s] = row[s + 1] = 0.0
         for i in range(s + 1):
-            row[i] += DEFECT[k, i] * correction[m]
+            row[i] += tables.DEFECT[k, i] * correction[m]
 
 
 @compiled
@@ -55,23 +45,13 @@ def keep_polynomial(w: Any) -> None:
 
 
 @compiled
-def interpolate(w: Any, x: float) -> None:
-    """Interpolate state and ledger at the fraction x of the step."""
-    top = stage_count(w.member) + 1
-    for m in range(w.n):
-        w.trial[m] = w.y[m] + nested(w.member, top, x, w.polynomial[m])
-    for m in range(w.n_ledger):
-        w.q_trial[m] = w.q[m] + nested(w.member, top, x, w.q_polynomial[m])
-
-
-@compiled
 def change_and_slope(k: int, x: float, row: Any) -> Any:
     """Return the change of a polynomial from the start of the step to the fraction x, and its derivative by x."""
     top = stage_count(k)
     value, slope = row[top], 0.0
     for i in range(top - 1, -1, -1):
-        slope = slope * (x - NEWTON_NODES[k, i]) + value
-        value = value * (x - NEWTON_NODES[k, i]) + row[i]
+        slope = slope * (x - tables.NEWTON_NODES[k, i]) + value
+        value = value * (x - tables.NEWTON_NODES[k, i]) + row[i]
     return value * x, slope * x + value
 
 
@@ -90,7 +70,7 @@ def put_inside(w: Any, h: float, x: float) -> None:
 @compiled
 def probe_ledger(w: Any, h: float) -> None:
     """Evaluate the ledger rates at the trial state, corrected by its error there, which a fast rate would magnify."""
-    n, rate = w.n, GAMMA[w.member] / h
+    n, rate = w.n, tables.GAMMA[w.member] / h
     for j in range(n):
         w.inputs[1 + j] = w.trial[j] + w.error[j]
         w.inputs[1 + n + j] = w.trial_dot[j] + rate * w.error[j]
@@ -104,8 +84,8 @@ def scan_step(w: Any) -> None:
     s = stage_count(k)
     copy(w.correction, w.z[s])  # a row that is free
     points, terms, z = 4 * k + 9, s + 1, w.z.ctypes.data
-    combine(SCAN_VALUES[k].ctypes.data, 8, points, terms, z, n, w.scanned.ctypes.data)
-    combine(SCAN_RATES[k].ctypes.data, 8, points, terms, z, n, w.scanned_rates.ctypes.data)
+    combine(tables.SCAN_VALUES[k].ctypes.data, 8, points, terms, z, n, w.scanned.ctypes.data)
+    combine(tables.SCAN_RATES[k].ctypes.data, 8, points, terms, z, n, w.scanned_rates.ctypes.data)
 
 
 @compiled
@@ -113,7 +93,7 @@ def put_scanned(w: Any, h: float, i: int) -> None:
     """Set the inputs to one of the points where guards are examined."""
     n, rate = w.n, 1.0 / h
     inputs, y, change, slope = w.inputs, w.y, w.scanned[i], w.scanned_rates[i]
-    inputs[0] = w.base + (w.tau + SCANNED[w.member, i] * h)
+    inputs[0] = w.base + (w.tau + tables.SCANNED[w.member, i] * h)
     for m in range(n):
         inputs[1 + m] = y[m] + change[m]
         inputs[1 + n + m] = slope[m] * rate
@@ -125,7 +105,7 @@ def finish_step(w: Any, h: float) -> None:
     ledger.
     """
     for m in range(w.n):
-        w.correction[m] = 0.0 if w.explicit != 0 else GAMMA[w.member] * w.error[m]
+        w.correction[m] = 0.0 if w.explicit != 0 else tables.GAMMA[w.member] * w.error[m]
     if w.n_ledger > 0:
         integrate_ledger(w, h)
 
@@ -140,12 +120,12 @@ def integrate_ledger(w: Any, h: float) -> None:
         evaluate(w, LEDGER, w.rates[i])
     # Radau's quadrature has the order 2s - 1 of the method, its polynomial that of the stages plus one.
     count, rates, stages, defects = w.n_ledger, w.rates, w.q_stage, w.q_correction
-    combine(COLLOCATION[k].ctypes.data, 7, s, s, rates.ctypes.data, count, stages.ctypes.data)
+    combine(tables.COLLOCATION[k].ctypes.data, 7, s, s, rates.ctypes.data, count, stages.ctypes.data)
     copy(rates[7], defects)
     for i in range(s):
         for m in range(count):
             stages[i, m] *= h
-            defects[m] -= START_RATE[k, i] * rates[i, m]
+            defects[m] -= tables.START_RATE[k, i] * rates[i, m]
     for m in range(count):
         defects[m] *= h
 
@@ -157,7 +137,7 @@ def hold_rates(w: Any, h: float) -> None:
     for m in range(w.n_ledger):
         for i in range(stage_count(k)):
             w.rates[i, m] = w.rates[7, m]
-            w.q_stage[i, m] = NODES[k, i] * h * w.rates[7, m]
+            w.q_stage[i, m] = tables.NODES[k, i] * h * w.rates[7, m]
         w.q_correction[m] = 0.0
 
 

@@ -8,7 +8,7 @@ from surfacechem.solve.contract import FITTED_PART, RETURN_FACTOR, Status
 from surfacechem.solve.edges import find_magnitudes, jump, resolve
 from surfacechem.solve.radau.consistency import find_consistent
 from surfacechem.solve.radau.dense import finish_step, hold_rates, ledger_norm
-from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
+from surfacechem.solve.radau.guards import AT_START, find_event, mark_at_end, restore_sides, start_margins
 from surfacechem.solve.radau.linear import LARGE_MATRIX
 from surfacechem.solve.radau.newton import stage_count
 from surfacechem.solve.radau.outputs import is_within, write_interior, write_now, write_outputs
@@ -204,7 +204,6 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
         return REPEAT, limit
     size = h
     if w.n_margins > 0:
-        keep_sides(w)
         size = find_event(w, h)
     if size == AT_START:
         return ENDED, h
@@ -361,16 +360,6 @@ def _begin_arc(w: Any, i: int) -> None:
 
 
 @compiled
-def _initialise_peaks(w: Any, flight_time: float) -> None:
-    """Initialise the largest sizes of the guards; after a rebound zero for those that return, as for exact values."""
-    copy(w.magnitude, w.margin_largest)
-    first = w.n_margins - w.edges.shape[0]
-    for e in range(w.edges.shape[0]):
-        if w.edges[e, RETURNS] >= 0:
-            w.margin_largest[first + e] = 0.0 if flight_time > 0.0 else max(w.magnitude[first + e], MICROMETRE)
-
-
-@compiled
 def _run_arc(w: Any, i: int, end: float, continued: bool) -> int:
     """Flow from the moment to an edge, a limit, or the end of a segment; return GOOD, or the status that ends the arc.
 
@@ -378,7 +367,11 @@ def _run_arc(w: Any, i: int, end: float, continued: bool) -> int:
     """
     flight_time = w.flight_time if w.rebound_time == w.moment[0] else 0.0
     _begin_arc(w, i)
-    _initialise_peaks(w, flight_time)
+    # After a rebound the sizes of guards that return are zero, as for exact values.
+    copy(w.magnitude, w.margin_largest)
+    for m in range(w.n_margins - w.edges.shape[0], w.n_margins):
+        if w.edges[m - w.n_margins + w.edges.shape[0], RETURNS] >= 0:
+            w.margin_largest[m] = 0.0 if flight_time > 0.0 else max(w.magnitude[m], MICROMETRE)
     # Stop just short of a breakpoint at which no load changes: formulas there are those of the next segment.
     last = end if w.loads_change else max(end - FEW_EPS * end, 0.5 * (w.arc_start + end))
     w.arc_end, w.outputs_end, w.base = last - w.arc_start, end, 0.0
@@ -434,20 +427,6 @@ def _carry_out(w: Any, i: int) -> int:
 
 
 @compiled
-def _begin_arcs(w: Any, i: int) -> None:
-    """Initialise a run whose edges are carried out here."""
-    clear(w.booked)
-    clear(w.exchanged)
-    copy(w.least_peaks, w.peaks_seen)
-    w.rebound_time, w.flight_time = -np.inf, 0.0
-    for k in range(w.jump_times.shape[0]):
-        w.jump_times[k] = -np.inf
-    for j in range(w.n):
-        w.least[j] = w.largest[j] = w.y[j]
-        w.moment[1 + j] = w.y[j]
-
-
-@compiled
 def _begin_segment(w: Any, i: int, segment: int) -> None:
     """Set the moment to the start of a segment, with its parameters, except the modes and registers, which last."""
     parameters, first = w.parameters[i], 1 + 2 * w.n
@@ -469,7 +448,13 @@ def _run_arcs(w: Any, i: int) -> int:
     """Run and carry out edges; return GOOD, or the status that ends the run."""
     segments = w.segments[row_of(w.segments, i)]
     last = segments.shape[0] - 1
-    _begin_arcs(w, i)
+    clear(w.exchanged)
+    copy(w.least_peaks, w.peaks_seen)
+    w.rebound_time, w.flight_time = -np.inf, 0.0
+    for k in range(w.jump_times.shape[0]):
+        w.jump_times[k] = -np.inf
+    for j in range(w.n):
+        w.moment[1 + j] = w.least[j] = w.largest[j] = w.y[j]
     for segment in range(last):
         _begin_segment(w, i, segment)
         end = segments[segment + 1]

@@ -10,15 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.tables import (
-    DENSE,
-    EXPLICIT,
-    EXPLICIT_ERRORS,
-    EXPLICIT_NODES,
-    GAMMA,
-    LAST_STAGE,
-    STAGES_OF_DENSE,
-)
+from surfacechem.solve.radau import tables
 from surfacechem.solve.radau.work import RATES, compiled, copy, evaluate, finite, weighted_sums
 from surfacechem.tolerances import TINY
 
@@ -51,9 +43,9 @@ DENSEST = 2
 """Member of the implicit family whose stages hold the dense output."""
 
 
-_change = weighted_sums(EXPLICIT)
-_errors = weighted_sums(EXPLICIT_ERRORS)
-_at_nodes = weighted_sums(DENSE)
+_change = weighted_sums(tables.EXPLICIT)
+_errors = weighted_sums(tables.EXPLICIT_ERRORS)
+_at_nodes = weighted_sums(tables.DENSE)
 
 
 @compiled
@@ -61,7 +53,7 @@ def _evaluate_stage(w: Any, h: float, i: int, change: Any) -> None:
     """Evaluate the rates of stage i from those of the earlier stages."""
     inputs, y, k = w.inputs, w.y, w.k
     _change(i, k.ctypes.data, w.n, w.n, change.ctypes.data)
-    inputs[0] = w.base + (w.tau + EXPLICIT_NODES[i] * h)
+    inputs[0] = w.base + (w.tau + tables.EXPLICIT_NODES[i] * h)
     for m in range(w.n):
         inputs[1 + m] = y[m] + h * change[m]
     evaluate(w, RATES, k[i])
@@ -87,9 +79,9 @@ def _interpolate(w: Any, h: float) -> bool:
     finite.
     """
     n, z = w.n, w.z
-    for i in range(STAGES_OF_DENSE, LAST_STAGE + 1):
+    for i in range(tables.STAGES_OF_DENSE, tables.LAST_STAGE + 1):
         _evaluate_stage(w, h, i, w.parts[0])
-    w.residuals += LAST_STAGE + 1 - STAGES_OF_DENSE
+    w.residuals += tables.LAST_STAGE + 1 - tables.STAGES_OF_DENSE
     for i in range(7):
         _at_nodes(i, w.k.ctypes.data, n, n, z[i].ctypes.data)
     total = 0.0
@@ -108,10 +100,10 @@ def step_explicitly(w: Any, h: float, worst: float) -> float:
     """
     w.h_factored = h
     copy(w.ydot, w.k[0])
-    for i in range(1, STAGES_OF_DENSE):
+    for i in range(1, tables.STAGES_OF_DENSE):
         # Both of the last two changes are kept: a vector may overwrite the three rows behind its own.
-        _evaluate_stage(w, h, i, w.slopes[4 if i == STAGES_OF_DENSE - 2 else 0])
-    w.residuals += STAGES_OF_DENSE - 1
+        _evaluate_stage(w, h, i, w.slopes[4 if i == tables.STAGES_OF_DENSE - 2 else 0])
+    w.residuals += tables.STAGES_OF_DENSE - 1
     # The error does not include the rates of these stages.
     for i in range(1, 5):
         if not finite(w.k[i]):
@@ -121,17 +113,10 @@ def step_explicitly(w: Any, h: float, worst: float) -> float:
 
 
 @compiled
-def mark_noise(w: Any, norm: float, expected: float) -> None:
-    """Count a repeated step whose error has not fallen with its size as stiff."""
-    if norm > MAX_ERROR_RATIO * expected:
-        w.stiff_steps += STIFF_STEPS
-
-
-@compiled
-def _is_long(w: Any) -> bool:
+def is_long(w: Any) -> bool:
     """True if a step is long compared with the fastest rate, which the last two stages estimate."""
     k, largest, fastest, speed, change = w.k, 0.0, 0.0, 0.0, 0.0
-    end, last = STAGES_OF_DENSE - 1, STAGES_OF_DENSE - 2
+    end, last = tables.STAGES_OF_DENSE - 1, tables.STAGES_OF_DENSE - 2
     for m in range(w.n):
         apart, unit = abs(k[end, m] - k[last, m]), 1.0 / w.weight[m]
         # From the variable in which the two differ most: in slower ones they differ by their error alone.
@@ -143,22 +128,15 @@ def _is_long(w: Any) -> bool:
 
 
 @compiled
-def is_stiff(w: Any) -> bool:
-    """True if steps have repeatedly been long compared with the fastest rate."""
-    w.stiff_steps = w.stiff_steps + 2 if _is_long(w) else max(w.stiff_steps - 1, 0)
-    return bool(w.stiff_steps >= 2 * STIFF_STEPS)
-
-
-@compiled
 def may_be_narrow(w: Any, h: float) -> bool:
     """True if the equations may change within less than the stages of a step resolve.
 
     Polynomials of a few states do not, if steps are not stiff and what they divide by changes by less than half of it.
     A cubic polynomial lies between its Bezier coefficients.
     """
-    if w.explicit == 0 or w.divisors.shape[0] == 0 or _is_long(w):
+    if w.explicit == 0 or w.divisors.shape[0] == 0 or is_long(w):
         return True
-    wide, end = True, STAGES_OF_DENSE - 1
+    wide, end = True, tables.STAGES_OF_DENSE - 1
     for m in range(w.n):
         if w.divisors[m]:
             first, last = w.y[m], w.y[m] + h * w.slopes[0, m]
@@ -166,16 +144,6 @@ def may_be_narrow(w: Any, h: float) -> bool:
             least, most = min(first, near, far, last), max(first, near, far, last)
             wide = wide and (least > SMOOTH_PART * most or most < SMOOTH_PART * least)
     return not wide
-
-
-@compiled
-def defect_of_rates(w: Any, error: Any) -> bool:
-    """Store the defect of the rates in the inputs, as an error of the state, in ``error``; True if finite."""
-    evaluate(w, RATES, error)
-    w.residuals += 1
-    for m in range(w.n):
-        error[m] = (error[m] - w.inputs[1 + w.n + m]) * w.h_factored / GAMMA[DENSEST]
-    return bool(finite(error))
 
 
 @compiled

@@ -66,13 +66,6 @@ def start_margins(w: Any) -> None:
 
 
 @compiled
-def keep_sides(w: Any) -> None:
-    """Store the margins at the start of a step."""
-    copy(w.side, w.side_first)
-    copy(w.margin_before, w.margin_first)
-
-
-@compiled
 def restore_sides(w: Any) -> None:
     """Restore the margins at the start of a step that is repeated; none has fired."""
     copy(w.side_first, w.side)
@@ -491,6 +484,8 @@ def find_event(w: Any, h: float) -> float:
     It is h if there is no event, 0 if the step must be repeated, and AT_START if a limit is passed at the start. If the
     event proves not to exist, the step ends there with no margin marked.
     """
+    copy(w.side, w.side_first)
+    copy(w.margin_before, w.margin_first)
     before, end = _scan(w, h)
     if end == NEEDS_SHORTER:
         restore_sides(w)

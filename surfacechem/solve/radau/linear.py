@@ -75,21 +75,9 @@ def _eliminate(a: Any, k: int) -> None:
 
 
 @compiled
-def _count_entries(a: Any, counts: Any) -> None:
-    """Count the entries of each row and column, and reset the column order."""
-    n = a.shape[0]
-    for i in range(n):
-        counts[0, i] = counts[1, i] = 0
-        counts[2, i] = i
-    for i in range(n):
-        for j in range(n):
-            if a[i, j] != 0.0:
-                counts[0, i] += 1
-                counts[1, j] += 1
-
-
-@compiled
-def _emptiest(a: Any, k: int, columns: Any, rows: Any, counts: Any, threshold: float) -> tuple[int, int, int]:
+def _emptiest(
+    a: Any, k: int, columns: Any, origins: Any, rows: Any, counts: Any, threshold: float
+) -> tuple[int, int, int]:
     """Return row and column of the next pivot, and the number of entries in that column; the row is -1 where no scaled
     pivot of the column exceeds the threshold.
     """
@@ -99,21 +87,24 @@ def _emptiest(a: Any, k: int, columns: Any, rows: Any, counts: Any, threshold: f
             q = j
     for i in range(k, n):
         if a[i, q] != 0.0:
-            counts[4, found] = i
+            counts[3, found] = i
             found += 1
             best = max(best, size_of(a[i, q]) * rows[i])
-    if best * columns[counts[2, q]] > threshold:
+    if best * columns[origins[q]] > threshold:
         for m in range(found):
-            i = counts[4, m]
+            i = counts[3, m]
             if size_of(a[i, q]) * rows[i] >= PIVOT_PART * best and (p < 0 or counts[0, i] < counts[0, p]):
                 p = i
     return p, q, found
 
 
 @compiled
-def _exchange(a: Any, k: int, p: int, q: int, rows: Any, counts: Any) -> None:
+def _exchange(a: Any, k: int, p: int, q: int, order: Any, rows: Any, counts: Any) -> None:
     """Exchange rows k and p, and columns k and q."""
     n = a.shape[0]
+    order[0, k], order[1, k] = p, q
+    order[4, k], order[4, p] = order[4, p], order[4, k]
+    order[5, k], order[5, q] = order[5, q], order[5, k]
     if p != k:
         for j in range(n):
             a[k, j], a[p, j] = a[p, j], a[k, j]
@@ -122,8 +113,7 @@ def _exchange(a: Any, k: int, p: int, q: int, rows: Any, counts: Any) -> None:
     if q != k:
         for i in range(n):
             a[i, k], a[i, q] = a[i, q], a[i, k]
-        for m in range(1, 3):
-            counts[m, k], counts[m, q] = counts[m, q], counts[m, k]
+        counts[1, k], counts[1, q] = counts[1, q], counts[1, k]
 
 
 @compiled
@@ -135,10 +125,10 @@ def _eliminate_entries(a: Any, k: int, p: int, below: int, counts: Any) -> None:
     for j in range(k + 1, n):
         if a[k, j] != 0.0:
             counts[1, j] -= 1
-            counts[3, found] = j
+            counts[2, found] = j
             found += 1
     for listed in range(below):
-        i = counts[4, listed]
+        i = counts[3, listed]
         if i == p:
             continue
         i = p if i == k else i
@@ -146,7 +136,7 @@ def _eliminate_entries(a: Any, k: int, p: int, below: int, counts: Any) -> None:
         a[i, k] = multiple
         counts[0, i] -= 1
         for m in range(found):
-            j = counts[3, m]
+            j = counts[2, m]
             if a[i, j] == 0.0:
                 counts[0, i] += 1
                 counts[1, j] += 1
@@ -176,30 +166,24 @@ def _list_entries(a: Any, order: Any, places: Any, marks: Any) -> None:
 
 
 @compiled
-def _list_origins(order: Any) -> None:
-    """List the original rows and columns of the factors, from the exchanges."""
-    n = order.shape[1]
-    for k in range(n):
-        order[4, k] = order[5, k] = k
-    for k in range(n):
-        for part in range(2):
-            p, origins = order[part, k], order[4 + part]
-            origins[k], origins[p] = origins[p], origins[k]
-
-
-@compiled
 def _factor_large(a: Any, order: Any, places: Any, columns: Any, rows: Any, counts: Any, threshold: float) -> bool:
+    n = a.shape[0]
+    for i in range(n):
+        counts[0, i] = counts[1, i] = 0
+        order[4, i] = order[5, i] = i
+    for i in range(n):
+        for j in range(n):
+            if a[i, j] != 0.0:
+                counts[0, i] += 1
+                counts[1, j] += 1
     order[3, 0] = -1  # not valid until complete: no other matrix may use this order
-    _count_entries(a, counts)
-    for k in range(a.shape[0]):
-        p, q, below = _emptiest(a, k, columns, rows, counts, threshold)
+    for k in range(n):
+        p, q, below = _emptiest(a, k, columns, order[5], rows, counts, threshold)
         if p < 0:
             return False
-        order[0, k], order[1, k] = p, q
-        _exchange(a, k, p, q, rows, counts)
+        _exchange(a, k, p, q, order, rows, counts)
         _eliminate_entries(a, k, p, below, counts)
-    _list_entries(a, order, places, counts[4])
-    _list_origins(order)
+    _list_entries(a, order, places, counts[3])
     return True
 
 
@@ -255,7 +239,7 @@ def factor(a: Any, order: Any, places: Any, columns: Any, rows: Any, counts: Any
 
     The rows of ``order`` hold: row exchanges, column exchanges, the number of entries of each row left of its diagonal,
     and in all, and the original rows and columns; ``places`` holds the columns of the entries. ``counts`` is work space
-    of five rows.
+    of four rows.
     """
     n = a.shape[0]
     if not _scale_rows(a, columns, rows[:n]):
@@ -356,14 +340,6 @@ def shifted(derivatives: Any, shift: Any, matrix: Any) -> None:
 
 
 @compiled
-def fold_shifted(w: Any, shift: Any, core: Any, border: Any, bands: Any) -> bool:
-    """Eliminate the chains of G_y + shift G_ydot from its core."""
-    shifted(w.border_derivatives, shift, border)
-    shifted(w.band_derivatives, shift, bands)
-    return bool(fold_chains(core, border, bands, w.chains))
-
-
-@compiled
 def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, places: Any, x: Any) -> None:
     """Overwrite a right-hand side by the solution of a system whose chains are eliminated from its core."""
     n = core.shape[0]
@@ -388,10 +364,7 @@ def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, 
 @compiled
 def solve_real(w: Any, x: Any) -> None:
     """Overwrite a right-hand side by the solution of the real Newton system."""
-    if w.links > 0:
-        _solve_chained(w.chains, w.real, w.real_border, w.real_bands, w.order[0], w.places[0], x)
-    else:
-        solve(w.real, w.order[0], w.places[0], x)
+    _solve_chained(w.chains, w.real, w.real_border, w.real_bands, w.order[0], w.places[0], x)
 
 
 @compiled
@@ -422,8 +395,5 @@ def bound_real(w: Any, x: Any) -> None:
 @compiled
 def solve_complex(w: Any, pair: int, x: Any) -> None:
     """Overwrite a right-hand side by the solution of the complex Newton system of one pair of eigenvalues."""
-    if w.links > 0:
-        border, bands = w.complex_border[pair], w.complex_bands[pair]
-        _solve_chained(w.chains, w.complex[pair], border, bands, w.order[1 + pair], w.places[1 + pair], x)
-    else:
-        solve(w.complex[pair], w.order[1 + pair], w.places[1 + pair], x)
+    border, bands = w.complex_border[pair], w.complex_bands[pair]
+    _solve_chained(w.chains, w.complex[pair], border, bands, w.order[1 + pair], w.places[1 + pair], x)

@@ -8,29 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from surfacechem.solve.radau import tables
 from surfacechem.solve.radau.explicit import put_rates
 from surfacechem.solve.radau.linear import (
     LARGE_MATRIX,
     count_entries_of_rows,
     factor,
     factor_again,
-    fold_shifted,
+    fold_chains,
     shifted,
     solve_complex,
     solve_real,
 )
 from surfacechem.solve.radau.roundoff import correction_is_noise
-from surfacechem.solve.radau.tables import (
-    COARSE_RTOL,
-    FROM_PARTS,
-    GAMMA,
-    INVERSE,
-    INVERSE_GAPS,
-    NEWTON_NODES,
-    NODES,
-    PAIR_VALUES,
-    TO_PARTS,
-)
 from surfacechem.solve.radau.work import (
     RESIDUAL,
     clear,
@@ -90,10 +80,10 @@ def divide(k: int, values: Any, m: int, row: Any) -> None:
     """
     s = stage_count(k)
     for i in range(s):
-        row[i] = values[i, m] * INVERSE_GAPS[k, 0, i]
+        row[i] = values[i, m] * tables.INVERSE_GAPS[k, 0, i]
     for level in range(1, s):
         for i in range(s - 1, level - 1, -1):
-            row[i] = (row[i] - row[i - 1]) * INVERSE_GAPS[k, level, i]
+            row[i] = (row[i] - row[i - 1]) * tables.INVERSE_GAPS[k, level, i]
 
 
 @compiled
@@ -101,7 +91,7 @@ def nested(k: int, top: int, x: float, row: Any) -> float:
     """Evaluate a polynomial in Newton's form at x; row[top] is its last coefficient."""
     value = row[top]
     for i in range(top - 1, -1, -1):
-        value = value * (x - NEWTON_NODES[k, i]) + row[i]
+        value = value * (x - tables.NEWTON_NODES[k, i]) + row[i]
     return float(value * x)
 
 
@@ -110,7 +100,7 @@ def nested_four(k: int, top: int, x: Any, row: Any) -> tuple[float, float, float
     """Evaluate a polynomial at four points at once, in four independent chains of operations."""
     a = b = c = d = row[top]
     for i in range(top - 1, -1, -1):
-        node, factor = NEWTON_NODES[k, i], row[i]
+        node, factor = tables.NEWTON_NODES[k, i], row[i]
         a, b, c, d = (
             a * (x[0] - node) + factor,
             b * (x[1] - node) + factor,
@@ -164,7 +154,7 @@ def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
             if not finite(w.jacobian[part, i]):
                 return False
     if w.core >= LARGE_MATRIX:
-        count_entries_of_rows(w.jacobian, w.entries[5])
+        count_entries_of_rows(w.jacobian, w.entries[4])
     # Chains that are not finite are found by their pivots.
     return True
 
@@ -175,7 +165,7 @@ def _factor_shifted(w: Any, m: int, shift: Any, matrix: Any, border: Any, bands:
     order, places = w.order[m], w.places[m]
     chained = w.links > 0
     if w.core >= LARGE_MATRIX and not chained:
-        entries = w.entries[5]
+        entries = w.entries[4]
         if order[3, 0] >= 0 and factor_again(w.jacobian, entries, shift, matrix, order, places, w.pivot, w.delta):
             return True
         if m > 0:
@@ -187,8 +177,11 @@ def _factor_shifted(w: Any, m: int, shift: Any, matrix: Any, border: Any, bands:
             if factor_again(w.jacobian, entries, shift, matrix, order, places, w.pivot, w.delta):
                 return True
     shifted(w.jacobian, shift, matrix)
-    if chained and not fold_shifted(w, shift, matrix, border, bands):
-        return False
+    if chained:
+        shifted(w.border_derivatives, shift, border)
+        shifted(w.band_derivatives, shift, bands)
+        if not fold_chains(matrix, border, bands, w.chains):
+            return False
     return bool(factor(matrix, order, places, w.pivot, w.delta, w.entries, 0.0))
 
 
@@ -197,11 +190,11 @@ def factor_newton(w: Any, h: float) -> bool:
     """Factor the real and the complex Newton matrices for this step size."""
     k = w.member
     w.factorizations += 1
-    if not _factor_shifted(w, 0, GAMMA[k] / h, w.real, w.real_border, w.real_bands):
+    if not _factor_shifted(w, 0, tables.GAMMA[k] / h, w.real, w.real_border, w.real_bands):
         return False
     for pair in range(k + 1):
         border, bands = w.complex_border[pair], w.complex_bands[pair]
-        if not _factor_shifted(w, 1 + pair, PAIR_VALUES[k, pair] / h, w.complex[pair], border, bands):
+        if not _factor_shifted(w, 1 + pair, tables.PAIR_VALUES[k, pair] / h, w.complex[pair], border, bands):
             return False
     return True
 
@@ -222,7 +215,7 @@ def predict(w: Any, h: float) -> None:
         # Predictions start at the end of the stored step, or at its start where the step is repeated with another size.
         start = 0.0 if w.offset == 0.0 else w.z_last[top - 1, m]
         for i in range(s):
-            x = w.offset + NODES[k, i] * h / w.h_last
+            x = w.offset + tables.NODES[k, i] * h / w.h_last
             z[i, m] = nested(last, top - 1, x, row) - start
 
 
@@ -232,7 +225,7 @@ def _put_stage(w: Any, i: int, h: float, rate: float) -> None:
     n = w.n
     # Local names save the loops a reload from the record after each store.
     inputs, z, y, slopes = w.inputs, w.z[i], w.y, w.slopes[i]
-    inputs[0] = w.base + (w.tau + NODES[w.member, i] * h)
+    inputs[0] = w.base + (w.tau + tables.NODES[w.member, i] * h)
     for m in range(n):
         inputs[1 + m] = y[m] + z[m]
         inputs[1 + n + m] = slopes[m] * rate
@@ -243,14 +236,14 @@ def set_stage(w: Any, i: int, h: float) -> None:
     """Set the inputs to stage i."""
     k = w.member
     if w.explicit != 0:
-        w.inputs[0] = w.base + (w.tau + NODES[k, i] * h)
+        w.inputs[0] = w.base + (w.tau + tables.NODES[k, i] * h)
         for m in range(w.n):
             w.inputs[1 + m] = w.y[m] + w.z[i, m]
             w.inputs[1 + w.n + m] = w.k[12, m]
         if i + 1 < stage_count(k):
             put_rates(w, w.trial_dot)
         return
-    combine(INVERSE[k, i].ctypes.data, 7, 1, stage_count(k), w.z.ctypes.data, w.n, w.slopes[i].ctypes.data)
+    combine(tables.INVERSE[k, i].ctypes.data, 7, 1, stage_count(k), w.z.ctypes.data, w.n, w.slopes[i].ctypes.data)
     _put_stage(w, i, h, 1.0 / h)
 
 
@@ -274,7 +267,7 @@ def _correct(w: Any) -> float:
     # Local names save the loops a reload from the record after each store.
     parts, pairs, g, z, weight = w.parts, w.pairs, w.g, w.z, w.weight
     # The stages decouple in the eigenbasis of the inverse collocation matrix (Butcher 1976; Bickart 1977).
-    combine(TO_PARTS[k].ctypes.data, 7, s, s, g.ctypes.data, n, parts.ctypes.data)
+    combine(tables.TO_PARTS[k].ctypes.data, 7, s, s, g.ctypes.data, n, parts.ctypes.data)
     solve_real(w, parts[0])
     for pair in range(k + 1):
         for m in range(n):
@@ -282,7 +275,7 @@ def _correct(w: Any) -> float:
         solve_complex(w, pair, pairs[pair])
         for m in range(n):
             parts[1 + 2 * pair, m], parts[2 + 2 * pair, m] = pairs[pair, m].real, pairs[pair, m].imag
-    combine(FROM_PARTS[k].ctypes.data, 7, s, s, parts.ctypes.data, n, g.ctypes.data)
+    combine(tables.FROM_PARTS[k].ctypes.data, 7, s, s, parts.ctypes.data, n, g.ctypes.data)
     norm = 0.0
     for m in range(n):
         largest = 0.0
@@ -311,7 +304,7 @@ def solve_stages(w: Any, h: float) -> int:
     norm_last, rate_last = 0.0, 0.0
     w.theta = 0.0
     for iteration in range(limit):
-        combine(INVERSE[k].ctypes.data, 7, s, s, w.z.ctypes.data, w.n, w.slopes.ctypes.data)
+        combine(tables.INVERSE[k].ctypes.data, 7, s, s, w.z.ctypes.data, w.n, w.slopes.ctypes.data)
         for i in range(s):
             _put_stage(w, i, h, rate_of_time)
             evaluate(w, RESIDUAL, w.g[i])
@@ -332,7 +325,7 @@ def solve_stages(w: Any, h: float) -> int:
             w.theta = rate
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
         # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
-        believed = iteration > 0 or w.rtol < COARSE_RTOL
+        believed = iteration > 0 or w.rtol < tables.COARSE_RTOL
         if (believed and contraction * norm <= NEWTON_PART) or norm <= ROUNDINGS * w.roundoff:
             w.contraction = contraction
             return CONVERGED

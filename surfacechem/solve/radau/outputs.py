@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.dense import integrate_ledger, interpolate, keep_polynomial, probe_ledger, scan_step
+from surfacechem.solve.radau.dense import integrate_ledger, keep_polynomial, probe_ledger, put_inside, scan_step
 from surfacechem.solve.radau.explicit import step_explicitly
 from surfacechem.solve.radau.newton import (
     CONVERGED,
@@ -21,7 +21,7 @@ from surfacechem.solve.radau.newton import (
     stage_count,
 )
 from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
-from surfacechem.solve.radau.step import defect_inside, store_polynomial
+from surfacechem.solve.radau.step import filter_residual, store_polynomial
 from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE, SCANNED
 from surfacechem.solve.radau.work import compiled, copy
 from surfacechem.tolerances import FINER_BY
@@ -51,9 +51,9 @@ def _largest(w: Any, floor: float) -> float:
 
 
 @compiled
-def _write_by_step(w: Any, size: float, h: float, output: Any) -> None:
+def _write_by_step(w: Any, times: Any, outputs: Any, i: int, h: float, origin: float) -> None:
     """Write an output computed by a separate step of full order; from the polynomial if Newton's method fails."""
-    stepped = False
+    size, stepped = ((times[i] - origin) - w.base) - w.tau, False
     if 0.0 < size < h and w.explicit != 0:
         stepped = step_explicitly(w, size, np.inf) < np.inf
     elif 0.0 < size < h and factor_newton(w, size):
@@ -63,11 +63,9 @@ def _write_by_step(w: Any, size: float, h: float, output: Any) -> None:
     if stepped:
         if w.n_ledger > 0:
             integrate_ledger(w, size)
-        end_of_step(w, size, w.trial, w.trial_dot, w.q_trial)
+        end_of_step(w, size, outputs[i], w.trial_dot, outputs[i, w.n :])
     else:
-        interpolate(w, min(max(size / h, 0.0), 1.0))
-    copy(w.trial, output)
-    copy(w.q_trial, output[w.n :])
+        write_four(w, times, outputs, i, i + 1, h, origin)
 
 
 @compiled
@@ -107,7 +105,8 @@ def _polynomial_serves(w: Any, h: float) -> bool:
     """Prepare the polynomials of state and ledger; True if that of the state is as accurate as the ends of the step."""
     keep_polynomial(w)
     # Check the equations midway between the stages, where the polynomial is least accurate.
-    defect_inside(w, h, PROBE[w.member])
+    put_inside(w, h, PROBE[w.member])
+    filter_residual(w)
     serves = _largest(w, 0.0) <= POLYNOMIAL_ERROR
     if not serves:
         find_noise(w)
@@ -140,7 +139,7 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
     theta, contraction, guessed, tries = w.theta, w.contraction, w.guess_error, w.newton_steps
     store_polynomial(w, h, 0.0)
     for i in range(first, last):
-        _write_by_step(w, ((times[i] - origin) - w.base) - w.tau, h, outputs[i])
+        _write_by_step(w, times, outputs, i, h, origin)
     _restore_step(w, h)
     # Restore the state of Newton's method too: the next step must not depend on the requested outputs.
     w.theta, w.contraction, w.guess_error, w.newton_steps = theta, contraction, guessed, tries

@@ -28,9 +28,9 @@ from surfacechem.solve.radau.dense import (
 )
 from surfacechem.solve.radau.explicit import (
     DENSEST,
-    defect_of_rates,
-    is_stiff,
-    mark_noise,
+    MAX_ERROR_RATIO,
+    STIFF_STEPS,
+    is_long,
     may_be_narrow,
     put_rates,
     step_explicitly,
@@ -50,8 +50,19 @@ from surfacechem.solve.radau.newton import (
 )
 from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
 from surfacechem.solve.radau.stepper import STOP
-from surfacechem.solve.radau.tables import MEMBER_RTOLS, START_SLOPE
-from surfacechem.solve.radau.work import LEDGER, RESIDUAL, compiled, copy, evaluate, finite, put, row_of, set_inputs
+from surfacechem.solve.radau.tables import GAMMA, MEMBER_RTOLS, START_SLOPE
+from surfacechem.solve.radau.work import (
+    LEDGER,
+    RATES,
+    RESIDUAL,
+    compiled,
+    copy,
+    evaluate,
+    finite,
+    put,
+    row_of,
+    set_inputs,
+)
 from surfacechem.tolerances import EPS, NEGLIGIBLE, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY, ULPS
 
 # The first two as in RADAU5 (Hairer & Wanner II, IV.8).
@@ -98,21 +109,17 @@ def filter_residual(w: Any) -> bool:
     """
     # Unfiltered, the defect of a stiff component would be as large as its rate (Hairer & Wanner II, IV.8).
     error = w.error
-    if w.explicit != 0:
-        return defect_of_rates(w, error)
-    evaluate(w, RESIDUAL, error)
     w.residuals += 1
-    solve_real(w, error)
-    for j in range(error.shape[0]):
-        error[j] = -error[j]
+    if w.explicit != 0:
+        evaluate(w, RATES, error)
+        for j in range(w.n):
+            error[j] = (error[j] - w.inputs[1 + w.n + j]) * w.h_factored / GAMMA[DENSEST]
+    else:
+        evaluate(w, RESIDUAL, error)
+        solve_real(w, error)
+        for j in range(w.n):
+            error[j] = -error[j]
     return bool(finite(error))
-
-
-@compiled
-def defect_inside(w: Any, h: float, x: float) -> bool:
-    """Store the defect of the polynomial at a fraction of the step in ``error``; True if finite."""
-    put_inside(w, h, x)
-    return bool(filter_residual(w))
 
 
 @compiled
@@ -180,16 +187,6 @@ def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) ->
     if h_last > 0.0 and norm < 1.0:
         factor = min(factor, factor * h / h_last * (norm_last / max(norm, RUN_EPS)) ** exponent)
     return h * min(MAX_GROWTH, max(MIN_GROWTH, factor))
-
-
-@compiled
-def convergent_size(w: Any, h: float) -> float:
-    """Step size at which Newton's method should contract well, if its contraction goes with the square of the step.
-
-    Infinite where the predictor was good or roundoff ended the iteration, as the contraction then means nothing.
-    """
-    theta = w.theta if w.guess_error > 1.0 else 0.0
-    return h * max(LEAST_CONVERGENT, np.sqrt(CONTRACTING / theta)) if theta > 0.0 else np.inf
 
 
 @compiled
@@ -301,23 +298,8 @@ STOPPED = int(Status.STOPPED)
 
 
 @compiled
-def start_explicitly(w: Any) -> bool:
-    """Start with explicit steps if allowed and the rates are finite; True if steps are explicit from here on."""
-    if w.explicit != 0:
-        set_inputs(w, w.y, w.ydot)
-        put_rates(w, w.trial_dot)
-        if finite(w.trial_dot):
-            copy(w.trial_dot, w.ydot)
-            w.member = DENSEST
-        else:
-            w.explicit = 0
-    return bool(w.explicit != 0)
-
-
-@compiled
-def _go_implicit(w: Any) -> None:
-    """Switch to implicit steps."""
-    w.explicit = 0
+def _reset_newton(w: Any) -> None:
+    """Reset what implicit steps know of those before."""
     w.h_last = w.h_factored = w.theta = w.guess_error = 0.0
     w.contraction = 1.0
     w.easy_steps = 0
@@ -329,14 +311,19 @@ def _go_implicit(w: Any) -> None:
 def restart(w: Any) -> int:
     """Make the state consistent and reset the history of steps; time is counted from here."""
     w.base += w.tau
-    w.tau = w.h_last = w.h_factored = 0.0
-    w.contraction = 1.0
-    w.easy_steps = 0
+    w.tau = 0.0
     w.ledger_rejections = min(w.ledger_rejections, (w.steps - w.steps_before) // 2)
-    w.jacobian_age = INVALID
-    w.member = preferred_member(w.rtol)
+    _reset_newton(w)
     w.inputs[0] = w.base
-    if not start_explicitly(w):
+    if w.explicit != 0:
+        set_inputs(w, w.y, w.ydot)
+        put_rates(w, w.trial_dot)
+        if finite(w.trial_dot):
+            copy(w.trial_dot, w.ydot)
+            w.member = DENSEST
+        else:
+            w.explicit = 0
+    if w.explicit == 0:
         copy(w.y, w.trial)
         copy(w.ydot, w.trial_dot)
         outcome = find_consistent(w)
@@ -399,8 +386,8 @@ def advance_explicitly(w: Any, h: float, i: int, h_last: float, norm_last: float
         if outcome != GOOD:
             return outcome, h, 0.0, h
         norm = step_explicitly(w, h, 1.0)
-        if failed:
-            mark_noise(w, norm, norm_last * (h / h_last) ** 8)
+        if failed and norm > MAX_ERROR_RATIO * (norm_last * (h / h_last) ** 8):
+            w.stiff_steps += STIFF_STEPS
         if norm < 1.0:
             proposed = h if failed else next_size(w, h, norm, h_last, norm_last)
             return GOOD, h, norm, min(proposed, next_size(w, h, norm, 0.0, 1.0))
@@ -460,7 +447,8 @@ def advance(w: Any, h: float, i: int, size_last: float, norm_last: float) -> tup
         found = advance_explicitly(w, h, i, size_last, norm_last)
         if found[0] != STEP_UNDERFLOW:
             return found
-        _go_implicit(w)
+        w.explicit = 0
+        _reset_newton(w)
     return advance_implicitly(w, h, i, size_last, norm_last)
 
 
@@ -487,8 +475,11 @@ def accept(w: Any, h: float) -> None:
     w.steps += 1
     w.jacobian_age = min(w.jacobian_age, OLD)
     set_weights(w)
-    if w.explicit != 0 and is_stiff(w):
-        _go_implicit(w)
+    if w.explicit != 0:
+        w.stiff_steps = w.stiff_steps + 2 if is_long(w) else max(w.stiff_steps - 1, 0)
+        if w.stiff_steps >= 2 * STIFF_STEPS:
+            w.explicit = 0
+            _reset_newton(w)
 
 
 @compiled
@@ -496,7 +487,10 @@ def keep_matrices(w: Any, h: float, proposed: float) -> float:
     """Choose the next step size: unchanged where Newton converged so fast that the factors are worth keeping."""
     if w.jacobian_age == INVALID:
         return proposed
-    proposed = min(proposed, convergent_size(w, h))
+    # Newton's contraction goes with the square of the step; it means nothing where the predictor was good or roundoff
+    # ended the iteration.
+    if w.guess_error > 1.0 and w.theta > 0.0:
+        proposed = min(proposed, h * max(LEAST_CONVERGENT, np.sqrt(CONTRACTING / w.theta)))
     if choose_member(w, SLOW):
         w.h_factored = 0.0
     elif w.theta < NEGLIGIBLE and h <= proposed <= 1.2 * h:
@@ -528,7 +522,8 @@ def _differs(w: Any, h: float, x: float, remaining: float) -> bool:
     """True if the equations, or the rates of the ledger at the corrected state, disagree with the polynomials at a
     fraction of the step.
     """
-    if not defect_inside(w, h, x):
+    put_inside(w, h, x)
+    if not filter_residual(w):
         return True
     if not error_norm(w, 0.0) <= MAX_DEFECT:
         find_noise(w)

@@ -171,7 +171,7 @@ MEMORY = {
     **_arrays("complex_bands", 3, "cells", 3, kind=complex),
     **_arrays("order", 4, 6, "core", kind=int),
     **_arrays("places", 4, "core", "core", kind=int),
-    **_arrays("entries", 6, "core", kind=int),
+    **_arrays("entries", 5, "core", kind=int),
     # polynomials in Newton's form: the stored one, and those of state and ledger over the step
     **_arrays("z_polynomial polynomial", "n", 9),
     # four outputs as fractions of the step
