@@ -32,7 +32,7 @@ import inspect
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, dataclass_transform
@@ -217,11 +217,9 @@ class Law(ABC):
         return tuple((item.name, item.metadata["spec"]) for item in dataclasses.fields(cls) if "spec" in item.metadata)
 
     @classmethod
-    def options(cls) -> Iterator[tuple[str, str]]:
-        """Yield names and meanings of the structural fields."""
-        for item in dataclasses.fields(cls):
-            if "option" in item.metadata:
-                yield item.name, item.metadata["option"]
+    def options(cls) -> list[tuple[str, str]]:
+        """Return names and meanings of the structural fields."""
+        return [(item.name, item.metadata["option"]) for item in dataclasses.fields(cls) if "option" in item.metadata]
 
     @property
     def varying(self) -> dict[str, Varying]:

@@ -106,7 +106,7 @@ class CoolPropFluid(Fluid):
 
     def critical_remark(self) -> str:
         """Return advice if the critical pressure is so close that properties are not smooth; else empty."""
-        critical = self._constant("Pcrit")
+        critical = self._asked("Pcrit")
         if critical is None or abs(self.pressure / critical - 1) > CRITICAL_DISTANCE:
             return ""
         return (
@@ -119,7 +119,13 @@ class CoolPropFluid(Fluid):
         return PROPERTIES[quantity](lambda letter: self._properties(letter, T), T)
 
     def _properties(self, letter: str, T: Array) -> Array:
-        call, given = _coolprop().PropsSI, self._given(T)
+        call, given, (boils, condenses) = _coolprop().PropsSI, "T", _limits(self)[2:]
+        # For a mixture, which has two saturation temperatures, with the phase: CoolProp's search for it would take a
+        # hundred times longer than a property.
+        if boils != condenses and condenses is not None and T.min() >= condenses:
+            given = "T|gas"
+        elif boils != condenses and boils is not None and T.max() <= boils:
+            given = "T|liquid"
         try:
             found = np.asarray(call(letter, given, T, "P", self.pressure, self.name), dtype=float)
         except ValueError:
@@ -133,21 +139,10 @@ class CoolPropFluid(Fluid):
             raise InputError(f"{self.title}: {reason}")
         return found
 
-    def _given(self, T: Array) -> str:
-        """Return CoolProp's key of temperatures, with the phase for a mixture, which has two saturation temperatures.
-
-        CoolProp's search for the phase would take a hundred times longer than a property.
-        """
-        boils, condenses = _limits(self)[2:]
-        if boils == condenses:
-            return "T"
-        if condenses is not None and T.min() >= condenses:
-            return "T|gas"
-        return "T|liquid" if boils is not None and T.max() <= boils else "T"
-
     def limits(self) -> list[float | None]:
         """Return the limits of the properties and the temperatures of boiling and condensing, if any [K]."""
-        low, high, boils, condenses = self._least(), self._call("Tmax"), self._saturation(0), self._saturation(1)
+        boils, condenses = (self._asked("T", "P", self.pressure, "Q", quality) for quality in (0, 1))
+        low, high = self._least(), self._call("Tmax")
         # Of a mixture near its critical point CoolProp finds only one of them.
         if boils is not None and condenses is None:
             condenses = self._end("gas", high, boils)
@@ -157,19 +152,21 @@ class CoolPropFluid(Fluid):
 
     def _least(self) -> float:
         """Return the least temperature with properties: the freezing point, or CoolProp's minimum."""
-        coolprop, low, freezes = _coolprop(), self._call("Tmin"), self._constant("T_freeze") or 0.0
+        coolprop, low, freezes = _coolprop(), self._call("Tmin"), self._asked("T_freeze") or 0.0
         with suppress(ValueError):  # mixtures, substances without a melting line, and pressures beyond its ends
             melting = coolprop.AbstractState("?", self.name).melting_line
             freezes = float(melting(coolprop.iT, coolprop.iP, self.pressure))
         if freezes * (1 + SATURATION_DISTANCE) > low:
             return freezes * (1 + SATURATION_DISTANCE)
         # CoolProp's minimum may belong to the liquid, which a vapour below the triple pressure does not reach.
-        return low * (1 + SATURATION_DISTANCE) if self.pressure < (self._constant("p_triple") or 0.0) else low
+        return low * (1 + SATURATION_DISTANCE) if self.pressure < (self._asked("p_triple") or 0.0) else low
 
-    def _constant(self, letters: str) -> float | None:
-        """Return a constant of the fluid from CoolProp; None if it is unknown."""
+    def _asked(self, *question: str | float) -> float | None:
+        """Return a number of the fluid from CoolProp: a constant, or its temperature at saturation; None if it has
+        none.
+        """
         try:
-            return float(_coolprop().PropsSI(letters, self.name))
+            return float(_coolprop().PropsSI(*question, self.name))
         except ValueError:
             return None
 
@@ -193,13 +190,6 @@ class CoolPropFluid(Fluid):
             close = difflib.get_close_matches(self.name, _coolprop().FluidsList(), n=1)
             hint = f"Did you mean '{close[0]}'?" if close else _reason(error)
             raise InputError(f"CoolProp knows no fluid '{self.name}'. {hint}") from None
-
-    def _saturation(self, quality: int) -> float | None:
-        """Return the temperature at which it boils (0) or condenses (1); None if it does not."""
-        try:
-            return float(_coolprop().PropsSI("T", "P", self.pressure, "Q", quality, self.name))
-        except ValueError:
-            return None
 
 
 @cache

@@ -163,7 +163,8 @@ def _close(build: Build) -> None:
 
 def _system(build: Build) -> System:
     """Return the immutable system of all records."""
-    far_fields, sinks = build.motion.far_fields, ledger.sinks(build)
+    sinks = ledger.sinks(build)
+    pulls = {f"W_{axis}": far for axis, far in build.motion.far_fields.items() if far.does_work}
     return System(
         t=build.t,
         states=tuple(build.states),
@@ -185,8 +186,8 @@ def _system(build: Build) -> System:
         equilibria=tuple(build.equilibria),
         sinks=sinks,
         followers={str(x): value for x, value in build.motion.followers.items()},
-        far_work={f"W_{axis}": far.F * far.gap for axis, far in far_fields.items() if far.F != 0},
-        far_fields={f"W_{axis}": (far.k, far.w, far.F, far.gap) for axis, far in far_fields.items() if far.does_work},
+        far_work={label: far.F * far.gap for label, far in pulls.items() if far.F != 0},
+        far_fields={label: (far.law.k, far.w, far.F, far.gap) for label, far in pulls.items()},
         warnings=(*build.interface.remarks, *build.warnings),
         external_rates=_outside(build),
         origin=partial(assemble, build.scene),

@@ -40,10 +40,21 @@ def masked(guard: Expression, when: When) -> Expression:
 
 
 @dataclass(frozen=True)
-class Mode:
-    """A discrete variable, such as stick or slip, which changes along edges only."""
+class Discrete:
+    """A variable that changes along edges only."""
 
     name: str
+
+    @property
+    def symbol(self) -> Any:
+        """Its symbol, a parameter that edges change."""
+        return symengine.Symbol(self.name)
+
+
+@dataclass(frozen=True)
+class Mode(Discrete):
+    """A discrete state, such as stick or slip."""
+
     initial: float
     words: Mapping[float, str]
     """Meaning of each value."""
@@ -53,30 +64,19 @@ class Mode:
     """Condition that ends a value, in words, for values that a complete run leaves."""
 
     @property
-    def symbol(self) -> Any:
-        """Its symbol, a parameter that edges change."""
-        return symengine.Symbol(self.name)
-
-    @property
     def legend(self) -> str:
         """Its values with their meanings, in words."""
         return ", ".join(f"{value:g}: {word}" for value, word in self.words.items())
 
 
 @dataclass(frozen=True)
-class Register:
-    """A number that only edges write and that later arcs and jumps read: a time, a direction or an impulse."""
+class Register(Discrete):
+    """A number that later arcs and jumps read: a time, a direction or an impulse."""
 
-    name: str
     text: str
     initial: float = 0.0
     given: Callable[[Mapping[str, float]], float] | None = None
     """The value at the start if it follows from the values of a case, by path."""
-
-    @property
-    def symbol(self) -> Any:
-        """Its symbol, a parameter that edges change."""
-        return symengine.Symbol(self.name)
 
 
 @dataclass(frozen=True)

@@ -240,9 +240,15 @@ class Reference(ABC):
         cls.parameters = fields(cls)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
-        """Check every parameter against its range."""
+        """Check every parameter against its range, and all of them together."""
         for item in self.parameters:
             item.metadata["spec"].check(f"{self.name}: {item.name}", getattr(self, item.name))
+        if flaw := self.flaw():
+            raise InputError(f"{self.name}: {flaw}")
+
+    def flaw(self) -> str:
+        """Return the reason why there is no solution with these parameters; empty if there is one."""
+        return ""
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:

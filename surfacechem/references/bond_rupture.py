@@ -487,11 +487,8 @@ class BilinearDebonding(Reference):
 
     readings = read(reaction="t_max E_b g_f", potential="H_r")
 
-    def __post_init__(self) -> None:
-        """Refuse a line that does not fall."""
-        super().__post_init__()
-        if self.g_f <= self.peak:
-            raise InputError(f"{self.name}: g_f must be above t_max / E_b = {self.peak!r} m.")
+    def flaw(self) -> str:
+        return f"g_f must be above t_max / E_b = {self.peak!r} m." if self.g_f <= self.peak else ""
 
     @property
     def peak(self) -> float:

@@ -322,11 +322,9 @@ class SemenovFold(Reference):
     # The factor of a law has the decay per kelvin; beta is the growth.
     readings = read(constant="T_0", total_conductance="H", heating_at_T_0="D_0", friction="beta=-beta")
 
-    def __post_init__(self) -> None:
-        """Refuse parameters beyond ignition."""
-        super().__post_init__()
-        if self.critical_dissipation < self.D_0:
-            raise InputError(f"{self.name}: no solution above D_0 = {self.critical_dissipation!r} W/m^2 (ignition).")
+    def flaw(self) -> str:
+        most = self.critical_dissipation
+        return f"no solution above D_0 = {most!r} W/m^2 (ignition)." if most < self.D_0 else ""
 
     @property
     def critical_dissipation(self) -> float:

@@ -277,11 +277,9 @@ class CohesivePullOff(CohesiveZoneOnSpring):
 
     readings = read(initial="w_i=w_n", ramp="w_dot=w_n")
 
-    def __post_init__(self) -> None:
-        """Refuse a start beyond the closed branch."""
-        super().__post_init__()
-        if self.severity < 1.0 and self.w_i > self.folds[0].w:
-            raise InputError(f"{self.name}: w_i must not be above the fold at {self.folds[0].w!r} m.")
+    def flaw(self) -> str:
+        most = self.folds[0].w if self.severity < 1.0 else math.inf
+        return f"w_i must not be above the fold at {most!r} m." if self.w_i > most else ""
 
     def quantities(self, t: Array) -> Quantities:
         w = self.w_i + self.w_dot * t

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.errors import InputError
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.references.base import (
     Array,
@@ -74,14 +73,11 @@ class Bonding(PerfectContact):
         potential="K_0 K_1 K_2", initial="phi_i=phi", temperature="T_i", relaxation_time="tau", friction_power="D"
     )
 
-    def __post_init__(self) -> None:
-        """Refuse parameters without a positive initial heat capacity."""
-        super().__post_init__()
-        if self.free_capacity <= 0.0:
-            raise InputError(
-                f"{self.name}: the total heat capacity must be positive, but K_2 (1 - phi_i)^2 takes away "
-                f"{1.0 - self.free_capacity:.17g} of it. Lower K_2 or raise phi_i."
-            )
+    def flaw(self) -> str:
+        if self.free_capacity > 0.0:
+            return ""
+        text = "the total heat capacity must be positive, but K_2 (1 - phi_i)^2 takes away"
+        return f"{text} {1.0 - self.free_capacity:.17g} of it. Lower K_2 or raise phi_i."
 
     @cached_property
     def free_capacity(self) -> float:
@@ -183,11 +179,9 @@ class EndothermicBonding(PerfectContact):
 
     readings = read(potential="K_2", relaxation_time="tau")
 
-    def __post_init__(self) -> None:
-        """Refuse parameters without a positive initial heat capacity."""
-        super().__post_init__()
-        if Fraction(self.K_2) >= Fraction(self.T_0) * self.exact_capacity:
-            raise InputError(f"{self.name}: K_2 must be below T_0 (C_1 + C_2 + C_c), the capacity it takes away.")
+    def flaw(self) -> str:
+        all_taken = Fraction(self.K_2) >= Fraction(self.T_0) * self.exact_capacity
+        return "K_2 must be below T_0 (C_1 + C_2 + C_c), the capacity it takes away." if all_taken else ""
 
     def quantities(self, t: Array) -> Quantities:
         return _from_reference(self, t)
@@ -525,11 +519,9 @@ class KamalCureConstantCapacity(Reference):
 
     readings = read(reaction="A_1 E_1 A_2 E_2 m n", initial="phi_i=phi", temperature="T_i", adiabatic_rise="delta_T")
 
-    def __post_init__(self) -> None:
-        """Refuse parameters with which the reaction cannot start."""
-        super().__post_init__()
-        if self.A_1 == 0.0 and (self.phi_i == 0.0 or self.A_2 == 0.0):
-            raise InputError(f"{self.name}: nothing starts the reaction; A_1 or phi_i and A_2 must be above zero.")
+    def flaw(self) -> str:
+        starts = self.A_1 > 0.0 or (self.phi_i > 0.0 and self.A_2 > 0.0)
+        return "" if starts else "nothing starts the reaction; A_1 or phi_i and A_2 must be above zero."
 
     def rate(self, cured: Array, left: Array) -> Array:
         """Return the rate of phi [1/s] when phi has grown by ``cured`` and is below one by ``left``."""

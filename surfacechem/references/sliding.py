@@ -9,7 +9,6 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.errors import InputError
 from surfacechem.references.base import (
     Array,
     ConstantCapacity,
@@ -274,11 +273,8 @@ class VelocitySteps(Reference):
 
     readings = read(friction="mu_0 a b L v_0", initial="p theta_i=theta v_i=v")
 
-    def __post_init__(self) -> None:
-        """Refuse steps in the wrong order."""
-        super().__post_init__()
-        if self.t_2 < self.t_1:
-            raise InputError(f"{self.name}: t_2 must not be below t_1 = {self.t_1!r} s.")
+    def flaw(self) -> str:
+        return f"t_2 must not be below t_1 = {self.t_1!r} s." if self.t_2 < self.t_1 else ""
 
     @abstractmethod
     def relaxed(self, ln_age: Array, slip: Array) -> Array:

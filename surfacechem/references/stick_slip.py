@@ -100,11 +100,8 @@ class StickSlip(Slider):
         bears = {} if mu is None or p is None else {"t_k": mu * p, "t_s": max(mu, mu_s or 0.0) * p}
         return {**super().from_scene(scene), **bears}
 
-    def __post_init__(self) -> None:
-        """Refuse a limit below the traction of sliding."""
-        super().__post_init__()
-        if self.t_s < self.t_k:
-            raise InputError(f"{self.name}: t_s must not be below t_k = {self.t_k!r} Pa.")
+    def flaw(self) -> str:
+        return f"t_s must not be below t_k = {self.t_k!r} Pa." if self.t_s < self.t_k else ""
 
     @property
     def slip(self) -> Slip:
@@ -177,11 +174,10 @@ class BondedSlider(Slider):
         cooler = T_0 / T if T and T_0 else 1.0  # bonds bear mu_b p T_0 / T
         return {name: x * cooler if x and name in ("mu_b", "mu_ub") else x for name, x in values.items()}
 
-    def __post_init__(self) -> None:
-        """Refuse a sticking limit below sliding friction, and limits so far apart that the contact would slip back."""
-        super().__post_init__()
-        if not self.mu_k <= self.mu_ub <= self.mu_b <= 2.0 * self.mu_k + self.mu_ub:
-            raise InputError(f"{self.name}: exact for mu_k <= mu_ub <= mu_b <= 2 mu_k + mu_ub only.")
+    def flaw(self) -> str:
+        # Below sliding friction it would not stick, and with limits so far apart it would slip back.
+        exact = self.mu_k <= self.mu_ub <= self.mu_b <= 2.0 * self.mu_k + self.mu_ub
+        return "" if exact else "exact for mu_k <= mu_ub <= mu_b <= 2 mu_k + mu_ub only."
 
     @abstractmethod
     def cycles(self) -> Iterator[Cycle]:

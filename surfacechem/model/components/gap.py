@@ -39,7 +39,7 @@ def variables(build: Build) -> Iterator[Constraint | Margin | State]:
             )
         far = far_field(build, mount)
         closed = contact(far.force(ZERO, ZERO), _bonded(build))
-        opening = closed.active * (far.w + far.F / far.k)
+        opening = closed.active * (far.w + far.F / far.law.k)
         build.variables.define("g_n", partial(build.name, VARIABLES["g_n"], opening), "algebraic", mount.by)
         yield closed
         _carry(build, closed.reaction)

@@ -130,15 +130,10 @@ def feels_pressure(law: Law) -> bool:
 
 @dataclass(frozen=True)
 class FarField:
-    """A mounting with its parameters as symbols, and the histories that drive it."""
+    """A mounting, its parameters as symbols, and the histories that drive it."""
 
     mount: Support
-    k: Expression
-    m: Expression
-    c_b: Expression
-    c_g: Expression
-    beta_1: Expression
-    e: Expression
+    law: Mounting
     w: Expression
     w_dot: Expression
     F: Expression
@@ -155,7 +150,7 @@ class FarField:
 
     def energy(self, g: Expression) -> Expression:
         """Return the elastic energy of the bodies [J/m^2]."""
-        return elastic_energy(self.k, self.w, g)
+        return elastic_energy(self.law.k, self.w, g)
 
     def elastic_traction(self, g: Expression) -> Expression:
         """Return the elastic traction of the bodies [Pa], the decrease of their energy with the gap."""
@@ -164,32 +159,32 @@ class FarField:
 
     def force(self, g: Expression, rate: Expression) -> Expression:
         """Return the traction with which the far field opens the gap [Pa]."""
-        return self.elastic_traction(g) + self.c_b * (self.w_dot - rate) + self.F
+        return self.elastic_traction(g) + self.law.c_b * (self.w_dot - rate) + self.F
 
     def size(self, g: Expression) -> Expression:
         """Return the size of the tractions that balance in the far field [Pa]."""
-        return self.k * (absolute(self.w) + absolute(g)) + absolute(self.F)
+        return self.law.k * (absolute(self.w) + absolute(g)) + absolute(self.F)
 
     def time_scales(self, text: str) -> list[TimeScale]:
         """Return the period of a mass on the bodies' stiffness, or the relaxation time of a damper in parallel."""
-        if self.k == 0:
+        if self.law.k == 0:
             return []
-        if self.m != 0:
+        if self.law.m != 0:
             remedy = "leave out the mass, so that it follows at once, or end the run sooner"
-            return [TimeScale(f"period of the {text}", 2 * math.pi * sqrt(self.m / self.k), remedy)]
-        if self.c_b + self.c_g != 0:
+            return [TimeScale(f"period of the {text}", 2 * math.pi * sqrt(self.law.m / self.law.k), remedy)]
+        if self.law.c_b + self.law.c_g != 0:
             remedy = "leave out the damper, so that it snaps where it loses its equilibrium"
-            return [TimeScale(f"relaxation of the {text}", (self.c_b + self.c_g) / self.k, remedy)]
+            return [TimeScale(f"relaxation of the {text}", (self.law.c_b + self.law.c_g) / self.law.k, remedy)]
         return []
 
     def receivers(self, build: Build) -> dict[str, Expression]:
         """Return the shares of places in the bodies in the dissipation of the support."""
-        shares = zip((body.name for body in build.scene.bodies), (self.beta_1, 1 - self.beta_1), strict=True)
+        shares = zip((body.name for body in build.scene.bodies), (self.law.beta_1, 1 - self.law.beta_1), strict=True)
         return {place: share * part for body, share in shares for place, part in build.thermal.volume(body).items()}
 
     def damped_rate(self, g: Expression, traction: Expression) -> Expression:
         """Return the rate of the gap at which the dampers alone balance the driving traction [m/s]."""
-        return (self.force(g, symengine.Integer(0)) - traction) / (self.c_b + self.c_g)
+        return (self.force(g, symengine.Integer(0)) - traction) / (self.law.c_b + self.law.c_g)
 
     def powers(
         self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None
@@ -205,23 +200,23 @@ class FarField:
         yield from self.time_scales(text)
         for name, energy, what in (
             ("spring", self.energy(g), "elastic energy of the bodies"),
-            ("kinetic", self.m * rate**2 / 2, "kinetic energy"),
+            ("kinetic", self.law.m * rate**2 / 2, "kinetic energy"),
         ):
             if energy != 0:
                 build.store(Quantity(f"E_{name}_{axis}", "J/m^2", f"{what}, {text}"), energy)
         bulk = self.w_dot - rate
-        power = (self.elastic_traction(g) + self.c_b * bulk) * self.w_dot + self.F * moves
+        power = (self.elastic_traction(g) + self.law.c_b * bulk) * self.w_dot + self.F * moves
         if power != 0:
             yield Power(WORK, OUTSIDE, MECHANICS, power, f"W_{axis}", f"work of the far field on the {text}")
-        if self.c_b != 0:
-            damped = self.c_b * bulk * (self.w_dot - moves)
+        if self.law.c_b != 0:
+            damped = self.law.c_b * bulk * (self.w_dot - moves)
             label, what = f"bulk_damper_{axis}", f"the damper of the bodies, {text}"
             symbol, receivers = symengine.Symbol(f"D_{label}"), self.receivers(build)
             produced = symengine.Add(*(share * symbol / build.thermal.places[at].T for at, share in receivers.items()))
             yield Power(DISSIPATION, MECHANICS, receivers, damped, label, what, entropy=produced)
-        if self.c_g != 0:
+        if self.law.c_g != 0:
             label = build.unique(f"contact_damper_{axis}")
-            yield Power(DISSIPATION, MECHANICS, INTERFACE, self.c_g * rate * moves, label)
+            yield Power(DISSIPATION, MECHANICS, INTERFACE, self.law.c_g * rate * moves, label)
 
     def balance(
         self,
@@ -245,8 +240,8 @@ class FarField:
         resisted = [-part for part in tractions]  # separate terms, no nested sum, so that terms cancel symbolically
         if self.mount.inertial:
             rows.kinematics(name, rate)
-            force = symengine.Add(self.force(self.gap, rate), *resisted, -self.c_g * rate)
-            rows.momentum(velocity, force, self.m, active, inertia)
+            force = symengine.Add(self.force(self.gap, rate), *resisted, -self.law.c_g * rate)
+            rows.momentum(velocity, force, self.law.m, active, inertia)
         elif self.mount.damped:
             rows.kinematics(name, rate)  # at the rate of the dampers under the unbalanced traction
         else:
@@ -274,14 +269,12 @@ def far_field(build: Build, mount: Support) -> FarField:
                 load.place,
             )
         w_dot = build.slope_of(w) if needed and given else none
-        build.motion.far_fields[mount.axis] = FarField(
-            mount, law.k, law.m, law.c_b, law.c_g, law.beta_1, law.e, drive, w_dot, force
-        )
+        build.motion.far_fields[mount.axis] = FarField(mount, law, drive, w_dot, force)
     far: FarField = build.motion.far_fields[mount.axis]
     return far
 
 
-def _bound(build: Build, mount: Support) -> Mounting | FarField:
+def _bound(build: Build, mount: Support) -> Mounting:
     """Return the parameters of a mounting as symbols; two axes share the mass, or the whole mounting."""
     if mount.first_axis is None:
         law = build.variables.bind(mount.law, f"mechanics.{SECTIONS[mount.axis]}", f"_{mount.axis}")
@@ -294,11 +287,11 @@ def _bound(build: Build, mount: Support) -> Mounting | FarField:
             if item.path == path and item.value > 0:
                 items[i] = replace(item, spec=replace(item.spec, above=0.0, at_least=-math.inf))
         return law
-    first = far_field(build, mount.first_axis)
+    first = far_field(build, mount.first_axis).law
     if mount.law is mount.first_axis.law:
         return first
     law = build.variables.bind(mount.law, f"mechanics.{SECTIONS[mount.axis]}", f"_{mount.axis}")
-    return replace(first, k=law.k, c_b=law.c_b, c_g=law.c_g, beta_1=law.beta_1)
+    return law.bind({"m": first.m, "e": first.e})
 
 
 def jumps(build: Build) -> Iterator[Constraint]:

@@ -254,7 +254,7 @@ def _balance(
     rate, tractions = build.motion.gap_rates[name], (carried, t_a)
     if kind.inertial:
         state = _velocity_state(build, kind)
-        inertia = sliding_friction.inertia(build, far.m) if state == DRIVE else None
+        inertia = sliding_friction.inertia(build, far.law.m) if state == DRIVE else None
         active = ONE if kind.elastic else slides
         yield from far.balance(build, rate, tractions, velocity=state, inertia=inertia, active=active)
     elif kind.elastic:
@@ -264,7 +264,7 @@ def _balance(
     elif kind.rate_dependent:
         v = symengine.Symbol(kind.d.velocity)
         build.rows.kinematics(name, v)
-        driving, damping = far.force(u, v) - t_a - carried - far.c_g * v, far.c_b + far.c_g
+        driving, damping = far.force(u, v) - t_a - carried - far.law.c_g * v, far.law.c_b + far.law.c_g
         return (yield from _sliding_row(build, kind, slides, driving, damping))
     elif kind.dead_load:
         build.rows.kinematics(name, ZERO)
@@ -274,7 +274,7 @@ def _balance(
             raise InputError(message, PLACE)
         yield from _sticks(build, limit, far.force(u, ZERO) - t_a - carried)
     else:
-        stiffness, limit = far.k if far.k != 0 else 1, _limit(build, kind)
+        stiffness, limit = far.law.k if far.law.k != 0 else 1, _limit(build, kind)
         yield from far.balance(build, rate, tractions, active=slides, held=stiffness * du, slip=1, limit=limit)
     return None
 

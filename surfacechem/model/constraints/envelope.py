@@ -132,7 +132,7 @@ def _tear(build: Build, phi: Expression, left: Expression) -> list[Edge]:
     mount = support(build, "n")
     if mount is None or not mount.quasi_static or "g_n" not in build.motion.gap_rates:
         return []
-    g, k = symengine.Symbol("g_n"), far_field(build, mount).k
+    g, k = symengine.Symbol("g_n"), far_field(build, mount).law.k
     slope = derivative(derivative(build.psi, g).subs({phi: left}), g)
     guard, lost = (k + slope) / (k + absolute(slope)), {MODE: -ONE}
     reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"

@@ -122,8 +122,8 @@ def _coupled_nodes(build: Build, residuals: Sequence[Expression]) -> list[Node]:
 def _size(build: Build, gap: Equilibrium, own: Expression) -> Expression:
     """Return the reference stiffness of a gap, to which its stiffness is related [Pa/m]."""
     far, g = build.motion.far_fields.get(gap.axis), symengine.Symbol(gap.state)
-    if far is not None and far.k != 0:
-        return far.k + absolute(far.k - own)
+    if far is not None and far.law.k != 0:
+        return far.law.k + absolute(far.law.k - own)
     if far is None:
         return where(absolute(g) > 0, build.expanded(gap.size) / absolute(g), 1)
     # The secant of the potential only: friction in parallel has no stiffness.

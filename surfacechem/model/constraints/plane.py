@@ -73,7 +73,7 @@ class Component:
     @property
     def driving(self) -> Expression:
         """Traction that drives slip."""
-        return self.far.force(self.u, self.rate) - self.t_a - self.resisted - self.far.c_g * self.rate
+        return self.far.force(self.u, self.rate) - self.t_a - self.resisted - self.far.law.c_g * self.rate
 
 
 def states(build: Build, kinds: Sequence[Formulation]) -> Iterator[Constraint]:
@@ -144,7 +144,7 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
             ratio = where(largest > 0, where(a > b, b, a) / where(largest > 0, largest, 1) - SQRT_EPS, 1)
             remedy = "Give the mounting a mass `m`, or friction along the other direction, too."
             yield Margin("friction in both directions", ratio, reason, remedy=remedy)
-        stable = growth(ahead, sum(side.far.c_b + side.far.c_g for side in sides))
+        stable = growth(ahead, sum(side.far.law.c_b + side.far.law.c_g for side in sides))
         yield Margin(f"{STABLE_PREFIX}speed", stable, kinds[0].unstable, when={SLIP: (1,)}, stability="speed")
     pull = _scaled(sides, largest)
     # Slip begins in the direction of the pull, or, with a limit of zero, in that of the rate of the drive.
@@ -162,7 +162,7 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
 
 def _inertial(build: Build, sides: Sequence[Component], largest: Expression) -> Expression:
     """Set Newton's law along and across the slip direction; return the guard whose zero stops slip."""
-    turn, m = symengine.Symbol("dturn_dt"), sides[0].far.m
+    turn, m = symengine.Symbol("dturn_dt"), sides[0].far.law.m
     (x, y), (c, s) = (side.driving for side in sides), _unit_vector()
     along, across = c * x + s * y, c * y - s * x
     # The speed that friction takes away within the rounding of time is the least speed in the turn.
@@ -265,7 +265,7 @@ def _resistance(build: Build, side: Component) -> Expression:
     """Return the resistance to slip along one of the directions alone [Pa]."""
     own = BEGAN[side.d is ACROSS]
     sliding = {b: symengine.Integer(b == own) for b in BEGAN} | {TURN: ZERO, SLIP: symengine.Integer(1)}
-    return build.expanded(side.resisted).subs(sliding) + (side.far.c_b + side.far.c_g) * SPEED
+    return build.expanded(side.resisted).subs(sliding) + (side.far.law.c_b + side.far.law.c_g) * SPEED
 
 
 def _scaled(sides: Sequence[Component], top: Expression) -> list[Expression]:

@@ -89,7 +89,7 @@ def friction_impulse(build: Build, impulse: Expression) -> Iterator[Constraint]:
         return
     v, exerted = symengine.Symbol("speed" if len(sliding) == 2 else "v"), IMPULSE.symbol
     ratio = build.energy.unbonded * symengine.Add(*(_impulse_ratio(build, law, v) for law in laws))
-    loss = ratio * exerted / far_field(build, sliding[0].mount).m
+    loss = ratio * exerted / far_field(build, sliding[0].mount).law.m
     stops = {} if build.mode("slip") is None else {SLIP: where(loss < absolute(v), SLIP, ZERO)}
     left = {v: where(loss < absolute(v), v - loss * sign(v), ZERO)}
     due, reason = where(exerted > 0, -1, 1), "friction answers the impact"

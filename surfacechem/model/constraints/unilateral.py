@@ -106,15 +106,15 @@ def impacts(build: Build) -> Iterator[Constraint]:
         yield _closing(Edge("touch", G, "the gap closes", build.closing_modes, shut, equilibrates=True, when=apart))
         return
     far = far_field(build, mount)
-    speed, pressing = absolute(V), -far.force(ZERO, ZERO) / far.m
+    speed, pressing = absolute(V), -far.force(ZERO, ZERO) / far.law.m
     at_rest, remembered = _rest_condition(build, far, speed, pressing)
-    yield from friction_impulse(build, (1 + far.e) * far.m * speed)
+    yield from friction_impulse(build, (1 + far.law.e) * far.law.m * speed)
     hits = Edge(
         "impact",
         G,
         "the bodies hit each other",
         {LANDED.symbol: at_rest, **remembered},
-        {**shut, V: where(at_rest > 0, ZERO, far.e * speed)},
+        {**shut, V: where(at_rest > 0, ZERO, far.law.e * speed)},
         return_time=where(pressing > 0, 2 * V / pressing, ZERO),
         when=apart,
     )
@@ -128,14 +128,14 @@ def _rest_condition(
     build: Build, far: FarField, speed: Expression, pressing: Expression
 ) -> tuple[Expression, dict[Expression, Expression]]:
     """Return an indicator, one if the bodies do not rebound, else zero, and new values of the registers it reads."""
-    if far.e == 0:
+    if far.law.e == 0:
         return ONE, {}
     tolerance = build.constant("tolerance", RTOL_PATH, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
     swift = where(speed > FASTEST.symbol, speed, FASTEST.symbol)
-    rebound = far.e * speed
+    rebound = far.law.e * speed
     nothing = NO_SPEED * tolerance
     # The next flight takes 2 rebound / pressing, all flights together 1 / (1 - e) times as long.
-    brief = pressing * build.t * ((1 - far.e) * nothing + SHORTEST_REBOUND)
+    brief = pressing * build.t * ((1 - far.law.e) * nothing + SHORTEST_REBOUND)
     slow = where(rebound < nothing * (swift + LEAST_IMPACT), 1, where(2 * rebound < brief, 1, 0))
     at_once = build.constant("rests_at", REST_TIME_PATH, Spec("s", "time at which rebounds rest"), -1.0, internal=True)
     return where(build.t > at_once, slow, 1), {FASTEST.symbol: swift}
