@@ -66,7 +66,7 @@ def test_what_is_no_polynomial_is_left_alone():
 
 def test_the_row_of_momentum_is_the_balance_or_keeps_what_is_held():
     rows, (inertia, force, moves) = Rows(), symengine.symbols("inertia force moves")
-    rows.momentum_of("v_t", inertia, force, moves)
+    rows.momentum("v_t", force, 1, moves, inertia)
     assert symengine.expand(rows["v_t"].subs({moves: 1})) == inertia - force
     assert rows["v_t"].subs({moves: 0}) == symengine.Symbol("dv_t_dt")
 
