@@ -75,16 +75,6 @@ def _find_guards(w: Any) -> None:
 
 
 @compiled
-def _is_beyond(w: Any, first: int) -> bool:
-    """True if a jump has carried the state beyond a limit."""
-    beyond = False
-    for m in range(first):
-        slack = 0.0 if w.kinds[m, 5] == 1 else GUARD_EPS * w.magnitude[m]
-        beyond = beyond or (w.kinds[m, 0] == 1 and w.active[m] == 1 and w.margin_probe[m] < -slack)
-    return beyond
-
-
-@compiled
 def _closing(w: Any, m: int) -> int:
     """Return CLOSED if the guard of an edge is below zero by more than the drift, RESTING or NEAR if it is zero."""
     value, size, small = w.margin_probe[m], w.magnitude[m], GUARD_EPS * w.magnitude[m]
@@ -128,8 +118,10 @@ def resolve(w: Any, i: int, end: float) -> bool:
         find_magnitudes(w)
         find_active(w)
         _find_guards(w)
-        if w.jump_times[-1] >= 0.0 and _is_beyond(w, first):
-            return False
+        for m in range(first if w.jump_times[-1] >= 0.0 else 0):  # limits beyond which a jump has carried the state
+            slack = 0.0 if w.kinds[m, 5] == 1 else GUARD_EPS * w.magnitude[m]
+            if w.kinds[m, 0] == 1 and w.active[m] == 1 and w.margin_probe[m] < -slack:
+                return False
         due = _due(w, first)
         if due == NO_EDGE:
             return True

@@ -13,20 +13,9 @@ from surfacechem.compile.program import Function, compile_function
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.automaton import FOLD_STIFFNESS, SIDE_PATH, SLIP_PATH
 from surfacechem.model.system import System
-from surfacechem.solve.branches import (
-    FIRST_OFFSET,
-    Curve,
-    Field,
-    Indices,
-    come_to_rest,
-    equilibrium,
-    first_driven_gap,
-    march,
-    next_root,
-    stiffness,
-    unstable_direction,
-)
-from surfacechem.solve.contract import Array
+from surfacechem.solve import branches
+from surfacechem.solve.branches import Curve, Field, Indices
+from surfacechem.solve.contract import Array, Index
 from surfacechem.tolerances import (
     DRIFT,
     GAP_EPS,
@@ -85,6 +74,12 @@ def formulas(expressions: Callable[[Any], Iterable[Expression]]) -> cached_prope
     return cached_property(lambda owner: compiled(owner.system, expressions(owner)))
 
 
+def rate_of(system: System, expression: Expression) -> Expression:
+    """Return the total time derivative of an expression of a system."""
+    expanded = system.expand(expression)
+    return sum((derivative(expanded, s.symbol) * s.dot for s in system.states), derivative(expanded, system.t))
+
+
 @dataclass(frozen=True)
 class GapDirection:
     """A direction in the space of the gaps, the gap that measures the distance, and the weights of the tractions."""
@@ -111,7 +106,7 @@ class FreeGaps:
     """The gaps that are not held at a point, as displacements from there."""
 
     which: Indices
-    columns: Array
+    columns: Index
     """Columns of the states that are the gaps."""
     changes: Array
     """Change of the states with each gap, shape (gaps, states)."""
@@ -127,6 +122,8 @@ class Equilibria:
         self.system = system
         self.states = [state.name for state in system.states]
         self.items = system.equilibria
+        self.columns = np.array([self.states.index(e.state) for e in self.items], dtype=np.int64)
+        """Columns of the states that are the gaps."""
         columns = system.parameter_columns
         self.slip = columns.get(SLIP_PATH) if any(e.slip for e in self.items) else None
         """Column of the sliding mode among the parameters, if gaps in equilibrium stick or slide."""
@@ -165,21 +162,18 @@ class Equilibria:
         """Return the indices of the gaps that are not held."""
         return np.nonzero(self._moving(point.inputs())[:: 1 + len(self.states)])[0]
 
-    def directions(self, point: Point) -> list[GapDirection]:
-        """Return the direction of each gap by itself."""
-        changes = self._moving(point.inputs()).reshape(len(self.items), 1 + len(self.states))[:, 1:]
-        alone = np.eye(len(self.items))
-        return [GapDirection(changes[j], self.states.index(e.state), alone[j]) for j, e in enumerate(self.items)]
+    def changes(self, point: Point) -> Array:
+        """Return the change of each state with each gap by itself, shape (gaps, states)."""
+        return self._moving(point.inputs()).reshape(len(self.items), 1 + len(self.states))[:, 1:]
 
     def together(self, point: Point, weights: Array) -> GapDirection:
         """Return the common direction of several gaps, measured by the gap that moves the most, whose weight is 1."""
-        lines = self.directions(point)
-        changes = sum((w * line.changes for w, line in zip(weights, lines, strict=True)), np.zeros(len(self.states)))
-        return GapDirection(changes, lines[int(np.abs(weights).argmax())].column, weights)
+        changes = (weights[:, None] * self.changes(point)).sum(axis=0)
+        return GapDirection(changes, int(self.columns[np.abs(weights).argmax()]), weights)
 
     def _free(self, point: Point, heat: Heat | None) -> FreeGaps:
-        which, lines = self.free(point), self.directions(point)
-        changes, columns = np.array([lines[j].changes for j in which]), np.array([lines[j].column for j in which])
+        which = self.free(point)
+        changes, columns = self.changes(point)[which], self.columns[which]
 
         def driving(moved: Array) -> Array:
             rows = np.repeat(point.inputs()[None], len(moved), axis=0)
@@ -262,7 +256,7 @@ class Equilibria:
             return point
         free = self._free(point, heat)
         n, sizes = len(free.which), np.maximum(free.scale, span[free.columns])
-        line = equilibrium(free.driving, sizes, np.arange(n), np.zeros(n), 1.0)
+        line = branches.equilibrium(free.driving, sizes, np.arange(n), np.zeros(n), 1.0)
         if line is None:
             return self.equilibrate(point, heat)
         there = replace(point, y=point.y + line @ free.changes)
@@ -275,14 +269,15 @@ class Equilibria:
             return self._damped(point, heat, lost)
         if len(free) == 0:
             return point
-        line, sign = (lost.direction, lost.sign) if lost else (self.directions(point)[free[0]], 0.0)
+        alone = np.eye(len(self.items))[free[0]]
+        line, sign = (lost.direction, lost.sign) if lost else (self.together(point, alone), 0.0)
         sliding = self.slip_sign(point, line)
         driving, noise = self._curves(point, line, heat)
         start = float(point.y[line.column])
         if sliding and not sign:
             gap = self._slid(point, line, sliding, driving, noise)
         else:
-            gap = march(driving, start, sign, noise)
+            gap = branches.march(driving, start, sign, noise)
             if gap is not None and abs(gap) < GAP_EPS and abs(driving([0.0])) <= noise([0.0]):
                 gap = 0.0  # exact, for laws that end at touch
         if gap is None or (sliding and gap == start):
@@ -298,11 +293,15 @@ class Equilibria:
         """
         start = float(point.y[line.column])
         now, least = sliding * float(driving([start])[0]), float(noise([start])[0])
-        beyond = march(lambda gaps: driving(gaps) + sliding * least, start, sliding, noise) if now > -least else start
+        beyond = (
+            branches.march(lambda gaps: driving(gaps) + sliding * least, start, sliding, noise)
+            if now > -least
+            else start
+        )
         slope = float(np.abs(line.weights) @ np.abs(self._tangents(point.inputs())[1::3]))
         if beyond is None or abs(beyond - start) * slope > BALANCED / NEWTON_EPS * least:
             return beyond
-        return march(driving, start, 0.0, noise) if now > 0 else start
+        return branches.march(driving, start, 0.0, noise) if now > 0 else start
 
     def _damped(self, point: Point, heat: Heat | None, lost: FoldPoint | None) -> Point | None:
         """Return the point at which several gaps come to rest together, by damped motion."""
@@ -311,13 +310,13 @@ class Equilibria:
         if lost is not None:
             along, noise = self._curves(point, lost.direction, heat)
             start = float(point.y[lost.direction.column])
-            gap = first_driven_gap(along, start, lost.sign, noise, lost=True)
+            gap = branches.first_driven_gap(along, start, lost.sign, noise, lost=True)
             if gap is None:
                 return None
             line = lost.sign * lost.direction.weights[free.which]
             # A smaller displacement is lost in the roundoff of the other gaps.
-            begins = line * max(abs(gap - start), FIRST_OFFSET / float(np.max(np.abs(line) / free.scale)))
-        rest = come_to_rest(free.driving, free.scale, self._slip_directions(point)[free.which], begins)
+            begins = line * max(abs(gap - start), branches.FIRST_OFFSET / float(np.max(np.abs(line) / free.scale)))
+        rest = branches.come_to_rest(free.driving, free.scale, self._slip_directions(point)[free.which], begins)
         if rest is None:
             return None
         y, columns = point.y + rest @ free.changes, free.columns
@@ -334,8 +333,8 @@ class Equilibria:
         tractions = sliding if sliding.any() else self._tangents(point.inputs())[2::3]
         if not tractions[free.which].any():
             return None
-        change = stiffness(free.driving, free.scale, np.zeros(len(free.which)))
-        found = unstable_direction(change) if np.all(np.isfinite(change)) else None
+        change = branches.stiffness(free.driving, free.scale, np.zeros(len(free.which)))
+        found = branches.unstable_direction(change) if np.all(np.isfinite(change)) else None
         weights = np.zeros(len(sliding))
         weights[free.which] = 0.0 if found is None else found
         sign = float(np.sign(weights @ tractions))
@@ -345,7 +344,7 @@ class Equilibria:
         driving, noise = self._curves(point, line, heat)
         start = float(point.y[line.column])
         left = np.abs(driving([start]))  # the residual that the integration may have caused
-        begins = first_driven_gap(driving, start, sign, lambda gaps: noise(gaps) + left, lost=False)
+        begins = branches.first_driven_gap(driving, start, sign, lambda gaps: noise(gaps) + left, lost=False)
         return None if begins is None else FoldPoint(point, line, sign)
 
     def corrected(self, point: Point) -> Point:
@@ -353,10 +352,11 @@ class Equilibria:
         for _ in range(CORRECTIONS if self.items else 0):
             values = self._tangents(point.inputs())
             y = point.y.copy()
-            for line, residual, slope in zip(self.directions(point), values[::3], values[1::3], strict=True):
+            tangents = zip(self.columns, self.changes(point), values[::3], values[1::3], strict=True)
+            for column, with_it, residual, slope in tangents:
                 change = -residual / slope if slope < 0 else 0.0
-                if abs(change) <= NEGLIGIBLE * max(abs(point.y[line.column]), PICOMETRE):  # larger changes are no drift
-                    y += change * line.changes
+                if abs(change) <= NEGLIGIBLE * max(abs(point.y[column]), PICOMETRE):  # larger changes are no drift
+                    y += change * with_it
             point = replace(point, y=y)
         return point
 
@@ -432,12 +432,8 @@ class Folds:
     @cached_property
     def _approach(self) -> Function:
         """Driving traction of each gap, and its total time derivative."""
-        states, t, found = self.system.states, self.system.t, []
-        for item in self.equilibria.items:
-            residual = self.system.expand(item.residual)
-            change = sum((derivative(residual, s.symbol) * s.dot for s in states), derivative(residual, t))
-            found += [residual, change]
-        return compiled(self.system, found)
+        residuals = [item.residual for item in self.equilibria.items]
+        return compiled(self.system, (x for each in residuals for x in (each, rate_of(self.system, each))))
 
     def _shape(self, index: int, point: Point) -> tuple[Array, GapDirection, Array]:
         """Return the decrease of a fold's tangent along each gap, the singular direction, and the change of the states
@@ -474,7 +470,7 @@ class Folds:
 
         start = float(point.y[line.column])
         passed = bool(ahead([start])[0] < 0)  # as a step may, by its tolerance
-        at = next_root(ahead, start, -sign if passed else sign, -1.0 if passed else 1.0)
+        at = branches.next_root(ahead, start, -sign if passed else sign, -1.0 if passed else 1.0)
         if at is None:
             return None
         return FoldPoint(self.equilibria.moved(point, self.equilibria.along(point, there, [at])), line, sign)

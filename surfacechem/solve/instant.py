@@ -252,20 +252,17 @@ class Instant:
         read = [self.system.expand(m.expression).free_symbols for m in self.system.event_margins[: self.first]]
         return {i for i, symbols in enumerate(read) if symbols & found}
 
-    def _friction_noise(self, index: int, point: Point) -> float:
-        """Return the roundoff of the margin of sticking [Pa], the larger of both sides of an edge."""
-        if not (len(self._slip_guards) and self.system.edges[index].equilibrates):
-            return 0.0
-        parameters = point.parameters.copy()
-        parameters[self.jumper.mode_columns] = self.jumper.modes_after(index, point)
-        both = [self.sizes(at)[self._slip_guards] for at in (replace(point, parameters=parameters), point)]
-        return GUARD_EPS * float(np.max(both))
-
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:
         """Carry out an edge and add it to the ledger; None if the run ends with it."""
         size, drift = float(self.sizes(point)[self.first + index]), drift_of(self.rtol)
-        balanced = BALANCED if self.system.edges[index].times else drift
-        slack = EdgeUncertainty(GUARD_EPS * size, drift * size, balanced, self._friction_noise(index, point), self.rtol)
+        balanced, sticking = BALANCED if self.system.edges[index].times else drift, 0.0
+        if len(self._slip_guards) and self.system.edges[index].equilibrates:
+            parameters = point.parameters.copy()
+            parameters[self.jumper.mode_columns] = self.jumper.modes_after(index, point)
+            # The larger magnitude of the margin of sticking on both sides of the edge.
+            both = [self.sizes(at)[self._slip_guards] for at in (replace(point, parameters=parameters), point)]
+            sticking = float(np.max(both))
+        slack = EdgeUncertainty(GUARD_EPS * size, drift * size, balanced, GUARD_EPS * sticking, self.rtol)
         step = self.step if self.step is not None and self.step.before.t == point.t else None
         before = self.jumps[-1].t if self.jumps else self.start
         begun, length, reached = self.last_flow

@@ -25,7 +25,7 @@ from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.system import System
 from surfacechem.solve.branches import zero
 from surfacechem.solve.contract import HEAT_STEPS, Array, Mask
-from surfacechem.solve.equilibria import Equilibria, GapDirection, Heat, Point, compiled, formulas
+from surfacechem.solve.equilibria import Equilibria, Heat, Point, compiled, formulas
 from surfacechem.tolerances import ULPS
 
 Moments = Callable[[Array, Array], tuple[Array, Array]]
@@ -268,7 +268,7 @@ class LoadPath:
         def moment(place: float, floor: float, taken: Array) -> tuple[float, float, Array]:
             """Return the part of the load path at a place, at least that before it, and energy and shares there."""
             y = start.y.copy()
-            y[columns] += place * length * line.changes[columns]
+            y[columns] += place * length * line
             there = replace(start, y=y, parameters=after.parameters)
 
             hot = self.heat.with_heat(start.inputs()[None], taken[None])[0, self.heat.free]
@@ -315,11 +315,12 @@ class LoadPath:
         stuck = self.equilibria.with_slip(point, 0.0)
         return self.equilibria.equilibrate_near(stuck, warm, span) or stuck
 
-    def _slip_direction(self, start: Point, after: Point) -> tuple[int, GapDirection, float]:
-        """Return the index of the sliding gap, its direction when it slides by itself, and the distance along that."""
-        lines = self.equilibria.directions(self.equilibria.with_slip(after, 0.0))
-        j = next(j for j, e in enumerate(self.equilibria.items) if e.slip)
-        along = [lines[j], *(line for line in lines if line is not lines[j] and 1 + line.column in self.moved)]
-        columns = np.array(self.moved) - 1
-        changes = np.array([line.changes[columns] for line in along]).T
-        return j, lines[j], float(np.linalg.lstsq(changes, (after.y - start.y)[columns], rcond=None)[0][0])
+    def _slip_direction(self, start: Point, after: Point) -> tuple[int, Array, float]:
+        """Return the index of the sliding gap, the change of the states that move along the interface with it by
+        itself, and its distance.
+        """
+        found, columns = self.equilibria, np.array(self.moved) - 1
+        j = next(j for j, e in enumerate(found.items) if e.slip)
+        others = [k for k, column in enumerate(found.columns) if k != j and 1 + column in self.moved]
+        changes = found.changes(found.with_slip(after, 0.0))[[j, *others]][:, columns]
+        return j, changes[0], float(np.linalg.lstsq(changes.T, (after.y - start.y)[columns], rcond=None)[0][0])

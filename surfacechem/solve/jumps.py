@@ -16,13 +16,13 @@ import numpy as np
 import symengine
 
 from surfacechem.compile.program import Function, Program, compile_function
-from surfacechem.expressions import derivative, magnitude
+from surfacechem.expressions import magnitude
 from surfacechem.model.automaton import INTERFACE, REST_TIME_PATH, Edge
 from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import START, System
 from surfacechem.quantities import VELOCITIES
 from surfacechem.solve.contract import Array, EdgeTables, integers
-from surfacechem.solve.equilibria import BALANCED, Equilibria, FoldPoint, Folds, Point, compiled, formulas
+from surfacechem.solve.equilibria import BALANCED, Equilibria, FoldPoint, Folds, Point, compiled, formulas, rate_of
 from surfacechem.solve.jump_heat import JumpHeat, LoadPath, LoadStep
 from surfacechem.solve.radau.stepper import (
     BONDS,
@@ -162,6 +162,8 @@ class Jumper:
 
     times_of_return = formulas(lambda self: (e.return_time for e in self.system.edges if e.return_time is not None))
     """Times of flight [s] of rebounds."""
+    guard_rates = formulas(lambda self: (rate_of(self.system, edge.guard) for edge in self.system.edges))
+    """Time derivatives of the guards of the edges, at consistent inputs."""
     _energy = formulas(lambda self: [self.system.jump_energy])
     """Energy that a jump conserves; compiled separately, as a search evaluates it at many rows."""
     _far_fields = formulas(lambda self: (item for pull in self.system.far_fields.values() for item in pull))
@@ -184,14 +186,6 @@ class Jumper:
         guards = [*(edge.guard for edge in self.system.edges), *(margin.expression for margin in self.system.margins)]
         read = set().union(*(self.system.expand(guard).free_symbols for guard in guards))
         return any(state.algebraic or state.dot in read for state in states)
-
-    @cached_property
-    def guard_rates(self) -> Function:
-        """Time derivatives of the guards of the edges, at consistent inputs."""
-        states, t = self.system.states, self.system.t
-        guards = [self.system.expand(edge.guard) for edge in self.system.edges]
-        rates = [sum((derivative(g, s.symbol) * s.dot for s in states), derivative(g, t)) for g in guards]
-        return compiled(self.system, rates)
 
     @cached_property
     def _total_functions(self) -> Function:

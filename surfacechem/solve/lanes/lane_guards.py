@@ -213,15 +213,6 @@ def find_crossings(w: Any, good: Any, close: Any) -> None:
 
 
 @compiled
-def _kink(w: Any, lane: int) -> bool:
-    """True if the equations may have a kink where a guard fires that this lane is about to reach."""
-    found = False
-    for m in range(w.n_margins):
-        found = found or (w.fired[m, lane] > 0.5 and w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0)
-    return found
-
-
-@compiled
 def ends_on_guard(w: Any, lane: int) -> bool:
     """True if a step onto a guard may end where it does; otherwise set the next trial, and mark it unclear after too
     many.
@@ -233,7 +224,10 @@ def ends_on_guard(w: Any, lane: int) -> bool:
     attempt = w.landing[lane] - 1
     resolution = 0.5 * EPS * (abs(w.t[lane]) + h)
     change = -value / slope if slope < 0.0 else 0.0
-    wanted = -1.0 if _kink(w, lane) else 1.0
+    wanted = 1.0
+    for m in range(w.n_margins):
+        if w.fired[m, lane] > 0.5 and w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0:
+            wanted = -1.0  # the equations may have a kink there
     lies = value * wanted <= 0.0
     if lies and (abs(change) <= resolution * (1 + attempt) or w.nudge[lane] > 0.0 or attempt >= 6):
         return True

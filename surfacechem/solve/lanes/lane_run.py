@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from surfacechem.compile.vectors import LANES
-from surfacechem.solve.contract import Status
 from surfacechem.solve.lanes.lane_guards import ends_on_guard, find_crossings, may_cross, start_margins
 from surfacechem.solve.lanes.lane_step import (
     END_STAGE,
@@ -38,12 +37,11 @@ from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, put_w
 from surfacechem.solve.radau.driver import FEWEST_CHECKS, LEAST_NORM
 from surfacechem.solve.radau.explicit import STIFF_STEPS
 from surfacechem.solve.radau.record import StepperRecord, laying_out
-from surfacechem.solve.radau.step import loosening
+from surfacechem.solve.radau.step import EVENT, FINISHED, LEFT, loosening
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
 from surfacechem.solve.radau.work import MARGINS, RATES, compiled, evaluate, row_of
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 
-FINISHED, EVENT, LEFT = int(Status.FINISHED), int(Status.EVENT), int(Status.LEFT)
 MOST_TRIALS = 16
 """Rejected trials in a row after which the cause is noise or stiffness. At a singular start, where each is a tenth of
 the last, they reach the shortest steps that matter.

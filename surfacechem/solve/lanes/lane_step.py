@@ -26,17 +26,9 @@ from surfacechem.solve.lanes.vector import (
     square_root,
     where,
 )
-from surfacechem.solve.radau import tables
+from surfacechem.solve.radau import explicit, tables
 from surfacechem.solve.radau.dense import FORESEEN_PART, N_GROUPS, ledger_rtol
-from surfacechem.solve.radau.explicit import (
-    DENSEST,
-    ERROR_PART,
-    FOLLOWED_PART,
-    MAX_ERROR_RATIO,
-    SMOOTH_PART,
-    STABILITY_LIMIT,
-    STIFF_STEP,
-)
+from surfacechem.solve.radau.explicit import DENSEST
 from surfacechem.solve.radau.step import CHECK_PART, END_CHECKS, MAX_DEFECT, MAX_GROWTH, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.work import RATES, compiled, evaluate, evaluate_at, weighted_sums
 from surfacechem.tolerances import LOOSE_RTOL, RUN_EPS, TINY
@@ -188,7 +180,7 @@ def try_step(w: Any) -> None:
         largest = where(error <= largest, largest, error)
         second = larger(second, absolute(lanes(w.fine[m])) * rate)
     # The estimate of fifth order, made one of seventh by that of third.
-    norm = largest * largest / (ERROR_PART * square_root(largest * largest + 0.01 * second * second + TINY))
+    norm = largest * largest / (explicit.ERROR_PART * square_root(largest * largest + 0.01 * second * second + TINY))
     put(w.norm, blank + (larger(norm, _ledger_norms(w)) if w.n_ledger > 0 else norm))
 
 
@@ -220,14 +212,14 @@ def find_stiff(w: Any) -> None:
         fastest = where(most, apart / (moved + TINY), fastest)
         speed = larger(speed, absolute(end) * unit)
         change = larger(change, absolute(end - lanes(w.k[0, m])) * unit)
-    is_limited = (fastest > STABILITY_LIMIT) & (change < FOLLOWED_PART * fastest * speed)
-    put(w.stiff, where((fastest > STIFF_STEP) | is_limited, 1.0, 0.0))
+    is_limited = (fastest > explicit.STABILITY_LIMIT) & (change < explicit.FOLLOWED_PART * fastest * speed)
+    put(w.stiff, where((fastest > explicit.STIFF_STEP) | is_limited, 1.0, 0.0))
 
 
 @compiled
 def is_noise(w: Any, lane: int) -> bool:
     """True if the error of a repeated step has not fallen with its size: noise, or stiffness."""
-    return bool(w.norm[lane] > MAX_ERROR_RATIO * w.norm_tried[lane] * (w.h[lane] / w.h_tried[lane]) ** 8)
+    return bool(w.norm[lane] > explicit.MAX_ERROR_RATIO * w.norm_tried[lane] * (w.h[lane] / w.h_tried[lane]) ** 8)
 
 
 @compiled
@@ -340,7 +332,7 @@ def _may_be_narrow(w: Any) -> Any:
                 smaller(smaller(first, near), smaller(far, last)),
                 larger(larger(first, near), larger(far, last)),
             )
-            wide = wide & ((least > SMOOTH_PART * most) | (most < SMOOTH_PART * least))
+            wide = wide & ((least > explicit.SMOOTH_PART * most) | (most < explicit.SMOOTH_PART * least))
     return ~wide
 
 

@@ -45,19 +45,10 @@ from surfacechem.solve.lanes.vector import (
     square_root,
     where,
 )
-from surfacechem.solve.radau import tables
+from surfacechem.solve.radau import newton, tables
 from surfacechem.solve.radau.dense import N_GROUPS, ledger_rtol
 from surfacechem.solve.radau.explicit import DENSEST
 from surfacechem.solve.radau.linear import PIVOT_PART
-from surfacechem.solve.radau.newton import (
-    DIVERGENT,
-    NEWTON_PART,
-    PREDICTOR_REACH,
-    ROUNDINGS,
-    SHORTENED,
-    SLOWEST_KNOWN,
-    TRUST,
-)
 from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
 from surfacechem.solve.radau.step import CONTRACTING, LEAST_CONVERGENT, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.work import JACOBIAN, RATES, RESIDUAL, compiled, evaluate, evaluate_at, weighted_sums
@@ -69,8 +60,8 @@ C = tables.NODES[MEMBER, :STAGES]
 POWER = 1.0 / (STAGES + 1.0)
 """Exponent of the size of a step: the estimate of s stages goes with h^(s+1)."""
 MOST_ITERATIONS = 9
-DIVERGED = (SAFETY / SHORTENED) ** (1.0 / POWER)
-"""Norm assigned to a step without convergence: the next trial is SHORTENED, as in single runs. If that fails
+DIVERGED = (SAFETY / newton.SHORTENED) ** (1.0 / POWER)
+"""Norm assigned to a step without convergence: the next trial is newton.SHORTENED, as in single runs. If that fails
 too, the next ones have a tenth each.
 """
 EIGENVALUES = np.array([tables.GAMMA[MEMBER], *tables.PAIR_VALUES[MEMBER, :2]])
@@ -231,7 +222,7 @@ def root_of(a: Any) -> Any:
 def _predict(w: Any) -> None:
     """Predict the increments of the stages from the last step; zero where there is none or the step is too long."""
     h, last = lanes(w.h), lanes(w.h_last)
-    known = (last > 0.0) & (h <= PREDICTOR_REACH * last)
+    known = (last > 0.0) & (h <= newton.PREDICTOR_REACH * last)
     ratio = where(known, h / last, 0.0)
     every = LANES * w.n
     for d in range(STAGES):
@@ -310,7 +301,7 @@ def _solve_stages(w: Any) -> Any:
     active = lanes(w.h) > 0.0
     solved = active & ~active
     fresh = ~(lanes(w.h_last) > 0.0)
-    contraction = exponential(TRUST * logarithm(larger(where(fresh, 1.0, lanes(w.contraction)), same(EPS))))
+    contraction = exponential(newton.TRUST * logarithm(larger(where(fresh, 1.0, lanes(w.contraction)), same(EPS))))
     theta, last, rate_last = same(0.0), same(1.0), same(0.0)
     for iteration in range(MOST_ITERATIONS):
         norm = _correct(w, active)
@@ -324,13 +315,13 @@ def _solve_stages(w: Any) -> Any:
             rate_last, expected = ratio, norm * rate / (1.0 - rate)
             for _ in range(MOST_ITERATIONS - 1 - iteration):
                 expected = expected * rate
-            goes_on = goes_on & (rate < DIVERGENT) & (expected <= NEWTON_PART)
+            goes_on = goes_on & (rate < newton.DIVERGENT) & (expected <= newton.NEWTON_PART)
             theta = where(active, rate, theta)
-            contraction = where(active, larger(rate / (1.0 - rate), same(SLOWEST_KNOWN)), contraction)
+            contraction = where(active, larger(rate / (1.0 - rate), same(newton.SLOWEST_KNOWN)), contraction)
         # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
-        met = norm <= ROUNDINGS * _roundoff(w)
+        met = norm <= newton.ROUNDINGS * _roundoff(w)
         if iteration > 0 or w.rtol < tables.COARSE_RTOL:
-            met = met | (goes_on & (contraction * norm <= NEWTON_PART))
+            met = met | (goes_on & (contraction * norm <= newton.NEWTON_PART))
         solved = solved | (active & met)
         active = active & goes_on & ~met
         if not any_lane(active):

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.contract import FITTED_PART, RETURN_FACTOR, Status
+from surfacechem.solve.contract import FITTED_PART, RETURN_FACTOR
 from surfacechem.solve.edges import find_magnitudes, jump, resolve
 from surfacechem.solve.radau.consistency import find_consistent
 from surfacechem.solve.radau.dense import finish_step, hold_rates, ledger_norm
@@ -14,7 +14,10 @@ from surfacechem.solve.radau.newton import stage_count
 from surfacechem.solve.radau.outputs import is_within, write_interior, write_now, write_outputs
 from surfacechem.solve.radau.step import (
     CHECK_PART,
+    EVENT,
+    FINISHED,
     GOOD,
+    LEFT,
     accept,
     advance,
     first_defect,
@@ -48,11 +51,6 @@ from surfacechem.solve.radau.work import (
     row_of,
 )
 from surfacechem.tolerances import FEW_EPS, LOOSE_RTOL, MICROMETRE, NEGLIGIBLE, PICOMETRE, RUN_EPS, SQRT_EPS
-
-FINISHED = int(Status.FINISHED)
-EVENT = int(Status.EVENT)
-LEFT = int(Status.LEFT)
-
 
 MOST_REFUSED = 40
 """Steps that the ledger may reject since the last restart, in addition to half of all: its error may be noise, which
@@ -494,19 +492,6 @@ def _run(w: Any, i: int) -> None:
         counts[FIRST_COUNTER + k] = counter
 
 
-@compiled
-def _make_consistent(w: Any, i: int) -> None:
-    """Make the state of a row [t | y | ydot] consistent in place."""
-    n, row = w.n, w.ends[i]
-    w.inputs[0] = row[0]
-    copy(w.parameters[row_of(w.parameters, i), 0], w.inputs[1 + 2 * n :])
-    copy(row[1 : 1 + n], w.trial)
-    copy(row[1 + n : 1 + 2 * n], w.trial_dot)
-    w.counts[i, END] = find_consistent(w)
-    copy(w.trial, row[1:])
-    copy(w.trial_dot, row[1 + n :])
-
-
 def run_batch(first: int, last: int, memory: Any, batch: Any) -> None:
     """Solve runs first to last - 1 of a batch; without segments make the rows of ``ends`` consistent.
 
@@ -516,7 +501,14 @@ def run_batch(first: int, last: int, memory: Any, batch: Any) -> None:
     w = lay_out(batch, memory)
     w.loose = loosening(w.rtol)
     for i in range(first, last):
-        if w.segments.shape[1] == 0:
-            _make_consistent(w, i)
-        else:
+        if w.segments.shape[1] > 0:
             _run(w, i)
+            continue
+        n, row = w.n, w.ends[i]
+        w.inputs[0] = row[0]
+        copy(w.parameters[row_of(w.parameters, i), 0], w.inputs[1 + 2 * n :])
+        copy(row[1 : 1 + n], w.trial)
+        copy(row[1 + n : 1 + 2 * n], w.trial_dot)
+        w.counts[i, END] = find_consistent(w)
+        copy(w.trial, row[1:])
+        copy(w.trial_dot, row[1 + n :])

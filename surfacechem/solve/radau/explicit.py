@@ -60,20 +60,6 @@ def _evaluate_stage(w: Any, h: float, i: int, change: Any) -> None:
 
 
 @compiled
-def _error_of_step(w: Any, h: float) -> float:
-    """Norm of the local error from the rates of all stages."""
-    n, errors, change, largest, second = w.n, w.parts, w.slopes[0], 0.0, 0.0
-    _errors(0, w.k.ctypes.data, n, n, errors[0].ctypes.data)
-    _errors(1, w.k.ctypes.data, n, n, errors[4].ctypes.data)
-    for m in range(n):
-        size = max(abs(w.y[m]), abs(w.y[m] + h * change[m]))
-        rate = h / max(w.atol[m] + w.rtol * size, TINY)
-        largest, second = max(largest, abs(errors[0, m]) * rate), max(second, abs(errors[4, m]) * rate)
-    # The estimate of fifth order, made one of seventh by that of third.
-    return float(largest * largest / (ERROR_PART * np.sqrt(largest * largest + 0.01 * second * second + TINY)))
-
-
-@compiled
 def _interpolate(w: Any, h: float) -> bool:
     """Evaluate the further stages and the dense output, as changes at the nodes of the implicit stages; True if
     finite.
@@ -108,7 +94,15 @@ def step_explicitly(w: Any, h: float, worst: float) -> float:
     for i in range(1, 5):
         if not finite(w.k[i]):
             return np.inf
-    norm = _error_of_step(w, h)
+    n, errors, change, largest, second = w.n, w.parts, w.slopes[0], 0.0, 0.0
+    _errors(0, w.k.ctypes.data, n, n, errors[0].ctypes.data)
+    _errors(1, w.k.ctypes.data, n, n, errors[4].ctypes.data)
+    for m in range(n):
+        size = max(abs(w.y[m]), abs(w.y[m] + h * change[m]))
+        rate = h / max(w.atol[m] + w.rtol * size, TINY)
+        largest, second = max(largest, abs(errors[0, m]) * rate), max(second, abs(errors[4, m]) * rate)
+    # The estimate of fifth order, made one of seventh by that of third.
+    norm = largest * largest / (ERROR_PART * np.sqrt(largest * largest + 0.01 * second * second + TINY))
     return norm if norm < worst and _interpolate(w, h) else max(norm, worst)
 
 

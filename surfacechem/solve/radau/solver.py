@@ -4,7 +4,7 @@ import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -50,6 +50,7 @@ Room: TypeAlias = tuple[int, int, int, int]
 CHUNK = 256
 """Runs that a thread takes at a time."""
 _STATUSES = tuple(Status)
+_floats = partial(np.ascontiguousarray, dtype=float)
 
 
 @lru_cache(maxsize=256)
@@ -81,12 +82,6 @@ def _peaks(problem: Problem) -> Array:
         return _zeros(len(none) + len(unseen))
     extremes = (problem.extremes.ravel(),) if problem.extremes is not None else ()
     return np.concatenate((none if accounts is None else accounts, unseen if guards is None else guards, *extremes))
-
-
-def _contiguous(values: ArrayLike) -> Array:
-    if isinstance(values, np.ndarray) and values.dtype == np.float64 and values.flags.c_contiguous:
-        return values
-    return np.ascontiguousarray(values, dtype=float)
 
 
 def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[NDArray[Any]]:
@@ -125,7 +120,7 @@ def batch_of(
     return Batch(
         *_with_edges(tables or (program.explicit_tables if explicit else program.tables), problem.edges),
         problem.rtol,
-        _contiguous(problem.atol),
+        _floats(problem.atol),
         int(explicit),
         _kinds(problem.margins, problem.active),
         int(problem.continued),
@@ -147,7 +142,7 @@ def batch_of(
 def _run_one(problem: Problem, room: Room | None = None) -> Any:
     """Run a batch of one; the compiled loop checks the stop flag before every step."""
     y0, parameters, segments, times = (
-        _contiguous(values)[None] for values in (problem.y0, problem.parameters, problem.segments, problem.times)
+        _floats(values)[None] for values in (problem.y0, problem.parameters, problem.segments, problem.times)
     )
     columns = y0, parameters, np.array((problem.spacing,)), np.array((problem.max_steps,)), _peaks(problem)[None]
     batch = batch_of(problem, (*columns, segments, times), room or _usual_room(problem, ALONE_ROWS, ALONE_ROWS))
@@ -229,7 +224,7 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
     def shared(rows: Sequence[Array] | Array) -> Array:
         """Return a single row if all problems have the same, else a row for each."""
         alike = all(np.array_equal(values, rows[0]) for values in rows[1:])
-        return _contiguous(rows[0])[None] if alike else np.array(rows, dtype=float)
+        return _floats(rows[0])[None] if alike else np.array(rows, dtype=float)
 
     own = [(each.y0, each.parameters, each.spacing, _peaks(each)) for each in problems]
     y0, parameters, spacing, peaks = (np.array(values, float) for values in zip(*own, strict=True))
@@ -275,6 +270,7 @@ def _result(problem: Problem, batch: Any, i: int, counts: Sequence[int]) -> Resu
     def written(table: Array, column: int) -> Array:
         return kept(table[i, : counts[column]])
 
+    inside = written(batch.inside, INSIDE) if problem.line_error else None
     return Result(
         problem=problem,
         status=_STATUSES[counts[END]],
@@ -289,19 +285,13 @@ def _result(problem: Problem, batch: Any, i: int, counts: Sequence[int]) -> Resu
         events=_events(written(batch.events, EVENTS), n) if counts[EVENTS] else _no_events(n, program.n_ledger),
         counters=Counters(*counts[FIRST_COUNTER:STOP]),
         steps=Points(*_points(written(batch.records, RECORDS), n)) if problem.record_steps else None,
-        inside=_inside(written(batch.inside_times, INSIDE), written(batch.inside, INSIDE), n)
-        if problem.line_error
-        else None,
+        inside=inside if inside is None else States(written(batch.inside_times, INSIDE), inside[:, :n], inside[:, n:]),
         course=EdgeCourse(written(batch.arcs, ARCS), written(batch.jumps, JUMPS)) if counts[ARCS] else None,
     )
 
 
 def _events(rows: Array, n: int) -> Events:
     return Events(*_points(rows[:, 1:], n), index=rows[:, 0].astype(np.int64))
-
-
-def _inside(moments: Array, rows: Array, n: int) -> States:
-    return States(moments, rows[:, :n], rows[:, n:])
 
 
 @cache
@@ -356,9 +346,7 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
     ends[:, 0] = np.broadcast_to(t, shape[:-1]).reshape(-1)
     ends[:, 1 : 1 + n] = values.reshape(-1, n)
     ends[:, 1 + n :] = np.broadcast_to(ydot, shape).reshape(-1, n)
-    table = (
-        _contiguous(parameters).reshape(-1, 1, program.n_parameters) if program.n_parameters else np.zeros((1, 1, 0))
-    )
+    table = _floats(parameters).reshape(-1, 1, program.n_parameters) if program.n_parameters else np.zeros((1, 1, 0))
     if len(table) not in (1, len(ends)):
         raise ValueError(f"{len(ends)} states but {len(table)} parameter vectors; one is needed, or one a state.")
     if program.external is not None:

@@ -289,12 +289,9 @@ corrections small however large the remaining error is.
 """
 
 GOOD = -1
-STEP_UNDERFLOW = int(Status.STEP_UNDERFLOW)
-MAX_STEPS = int(Status.MAX_STEPS)
-NONFINITE = int(Status.NOT_FINITE)
-NO_CONSISTENT = int(Status.NO_CONSISTENT_STATE)
-SINGULAR = int(Status.SINGULAR)
-STOPPED = int(Status.STOPPED)
+"""Outcome where a run may go on; others are numbers of a status."""
+FINISHED, EVENT, STEP_UNDERFLOW, MAX_STEPS, NONFINITE, *_OTHERS = map(int, Status)
+NO_CONSISTENT, SINGULAR, STOPPED, _, LEFT = _OTHERS
 
 
 @compiled
