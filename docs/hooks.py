@@ -331,7 +331,7 @@ def _held(item: Any) -> tuple[str, ...]:
     from surfacechem.format import declarations as d
 
     law = item.content.content if isinstance(item.content, d.ListOf) else item.content
-    words = _linked(item.content.words)
+    words = _linked(_words(item.content))
     if isinstance(law, d.OneLaw):
         families = FAMILIES[law.contract]
         words = "list of laws: " + ", ".join(f"[{family.replace('_', ' ')}](laws/{family}.md)" for family in families)
@@ -340,6 +340,28 @@ def _held(item: Any) -> tuple[str, ...]:
     default = "required" if item.required else f"{item.default:g}" if isinstance(item.default, int | float) else ""
     default = f"`{item.default}`" if isinstance(item.default, str) and item.default else default
     return words, _unit(item.unit) if item.unit != "1" else "", allowed, default
+
+
+def _words(content: Any) -> str:
+    """Content of a key in words; empty for what a section refers to later."""
+    from surfacechem.format import declarations as d
+
+    if isinstance(content, d.Number | d.Integer):
+        kind = "number" if isinstance(content, d.Integer) else "quantity"
+        return f"{kind} or `{content.word}`" if content.word else kind
+    if isinstance(content, d.ByShape):
+        return " or ".join(filter(None, map(_words, content.contents)))
+    if isinstance(content, d.ListOf):
+        return f"list of {_words(content.content)}".removesuffix(" of ")
+    if isinstance(content, d.OneOf):
+        return ", ".join(f"`{name}`" for name in content.names())
+    if isinstance(content, d.OneLaw):
+        return f"{content.contract.contract} laws"
+    if isinstance(content, d.Entries):
+        return content.words
+    return {d.Text: "text", d.Prescribed: "history", d.Temperature: "name or history", d.Nested: "mapping"}.get(
+        type(content), ""
+    )
 
 
 def _linked(text: str) -> str:

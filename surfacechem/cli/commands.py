@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from surfacechem.format.plans import Plan
     from surfacechem.runs.simulation import Simulation
-    from surfacechem.runs.streaming import Progress
+    from surfacechem.runs.streaming import Progress, Stream
     from surfacechem.solve.run import Run
 
 R = TypeVar("R")
@@ -117,11 +117,6 @@ def _print_error(message: object) -> None:
 class Commands(TyperGroup):
     """Commands whose errors are one message on stderr and an exit code."""
 
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of the commands in the usual order of use."""
-        names = super().list_commands(ctx)
-        return sorted(names, key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER))
-
     def main(self, *arguments: Any, **options: Any) -> Any:
         """Run the command line, with rarer garbage collections: at the usual rate they take a tenth of a command,
         although imports create no garbage.
@@ -156,13 +151,6 @@ class Commands(TyperGroup):
 def written_to(text: str) -> Any:
     """Return the option for the file of a command's output."""
     return Option("--output", "-o", help=text)
-
-
-ORDER = (
-    *("new", "cases", "laws", "check", "run", "plot", "report", "sweep", "evaluate", "equations", "mechanism"),
-    *("steady", "rerun", "precision", "stability", "figures", "schema"),
-)
-"""Commands in the usual order of use; others follow."""
 
 
 def case_names(incomplete: str) -> list[str]:
@@ -214,6 +202,13 @@ Verbose = Annotated[
         show_default=False,
     ),
 ]
+
+
+def is_dataset(source: str) -> bool:
+    """True for the name of a dataset, by its suffix: a missing one must not be taken for the name of a case."""
+    from surfacechem.results.netcdf import RUN_SUFFIXES
+
+    return source.rstrip("/").endswith((*RUN_SUFFIXES, ".zarr"))
 
 
 def load_case(case: str, changes: Sequence[str] | None) -> Simulation:
@@ -330,42 +325,29 @@ def leave_with(status: str, reason: str = "") -> None:
 log = logging.getLogger(__name__)
 
 
-def goes_to_store(output: Path | None, options: dict[str, object]) -> bool:
-    """True if a sweep goes into a store; InputError for an option that is only for stores."""
-    if output is not None and output.suffix == ".zarr":
-        return True
-    for name, value in options.items():
-        if value:
-            raise InputError("belongs to a store: give `-o NAME.zarr`.", Place(path=name))
-    return False
-
-
 def write_store(
-    simulation: Simulation,
-    planned: Callable[[], Plan],
-    target: Path,
-    talk: bool | None,
-    resume: bool,
-    part: str | None,
-    cluster: str | None,
-    only: str | None,
+    prepared: Callable[[], Stream], talk: bool | None, cluster: str | None = None, file: Path | None = None
 ) -> None:
-    """Run a sweep into a store; after an interrupt the message says how to resume. With ``only`` the runs of a store
-    with this status are repeated, into another store next to it.
+    """Run a sweep into a store; after an interrupt the message says how to resume. The store is converted to a
+    ``file``, netCDF or a table, if one is given.
     """
+    from surfacechem.results.netcdf import save_kept
     from surfacechem.runs.summaries import store_summary
 
-    numbers = part_of(part)
-    plan, target = plan_of_runs(target, only, resume or part is not None) if only else (planned(), target)
     with client_at(cluster) as client:
-        stream = simulation.stream(plan, target, resume=resume, part=numbers)
+        stream = prepared()
         try:
             store = solve(lambda: stream.run(None, client, log_progress()), talk, brief=True, waits=stream.chunks.waits)
             errors = solve(stream.check, talk)
         except SignalledError as error:
+            if file:
+                raise
             # A chunk without its mark counts as missing.
             end_by_signal(error, "what is stored is kept: go on with --resume.")
-    status, sheet = store_summary(stream, store, errors)
+    status, sheet = store_summary(stream, store, errors, file)
+    if file:
+        with store.dataset as data:
+            save_kept(data, file)
     if talk is not False:
         show(sheet)
     leave_with(status)
@@ -382,24 +364,6 @@ def plan_of_runs(source: Path, status: str, goes_on: bool) -> tuple[Plan, Path]:
 
     new = next(k for k in count(1) if not numbered(k).exists())
     return failed_runs(source, status), numbered(max(new - goes_on, 1))
-
-
-def write_file(simulation: Simulation, plan: Plan, target: Path, talk: bool | None) -> None:
-    """Run a sweep into a temporary store, and convert the complete store to one file, netCDF or a table."""
-    from tempfile import TemporaryDirectory
-
-    from surfacechem.results.netcdf import save_kept
-    from surfacechem.runs.summaries import store_summary
-
-    with TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
-        stream = simulation.stream(plan, Path(folder) / "sweep.zarr")
-        store = solve(lambda: stream.run(on_progress=log_progress()), talk, brief=True, waits=stream.chunks.waits)
-        status, sheet = store_summary(stream, store, solve(stream.check, talk), target)
-        with store.dataset as data:
-            save_kept(data, target)
-    if talk is not False:
-        show(sheet)
-    leave_with(status)
 
 
 def part_of(text: str | None) -> tuple[int, int]:

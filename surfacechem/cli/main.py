@@ -1,4 +1,4 @@
-"""The command line. Every command imports its modules when it is called."""
+"""The command line, with the commands in the usual order of use. Each imports its modules when it is called."""
 
 from __future__ import annotations
 
@@ -28,16 +28,17 @@ from surfacechem.cli.commands import (
     Verbose,
     case_names,
     check_picture,
-    goes_to_store,
+    is_dataset,
     law_names,
     leave_with,
     load_case,
     load_stepper,
+    part_of,
+    plan_of_runs,
     refuse_unwritable,
     run_settings,
     solve,
     split_list,
-    write_file,
     write_store,
     written_to,
 )
@@ -72,6 +73,119 @@ def main(
     version: Annotated[bool, Option("--version", callback=_version, is_eager=True, help="Print the version.")] = False,
 ) -> None:
     """Contact interfaces that bond, slide, break and heat."""
+
+
+@app.command(epilog=EXIT_CODES)
+def new(
+    file: Annotated[
+        Path, Argument(metavar="FILE.yaml", help="The case file to write; an existing file is never overwritten.")
+    ],
+    like: Annotated[
+        str, Option("--from", metavar="NAME", help="The shipped case to copy.", autocompletion=case_names)
+    ] = "exothermic",
+) -> None:
+    """Start a case of your own from a shipped one."""
+    from surfacechem.results.netcdf import replacing
+    from surfacechem.runs.listing import case_text
+
+    if file.suffix.lower() not in (".yaml", ".yml"):
+        raise InputError(f"a case is YAML: give {file.with_suffix('.yaml').name}.", Place(path=str(file)))
+    if file.exists():
+        raise InputError("is there already; give another name.", Place(path=str(file)))
+    text = case_text(like)
+    with replacing(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    starts = ["run", "sweep"] if "\nsweep:" in text else ["run"]
+    commands = " or ".join(f"`surfacechem {start} {file}`" for start in starts)
+    typer.echo(f"{file}, from {like}. Next: `surfacechem check {file}`, then {commands}.")
+
+
+@app.command(epilog=EXIT_CODES)
+def cases(
+    name: Annotated[str | None, Argument(help="Print this case.", autocompletion=case_names)] = None,
+) -> None:
+    """List the cases that come with the package, or print one."""
+    from surfacechem.runs.listing import case_table, case_text
+
+    if name:
+        typer.echo(case_text(name), nl=False)
+    else:
+        show(case_table())
+
+
+@app.command(epilog=EXIT_CODES)
+def laws(
+    name: Annotated[
+        str | None, Argument(help="Show this law, or all laws of this contract, in full.", autocompletion=law_names)
+    ] = None,
+    file: Annotated[
+        Path | None, Option("--from", metavar="FILE.py", help="A file with laws of your own; its code is executed.")
+    ] = None,
+    check: Annotated[
+        bool, Option("--check", help="Check the laws of the file: documentation, units, derivatives, thermodynamics.")
+    ] = False,
+) -> None:
+    """List the laws by contract, show one, or check laws of your own."""
+    from surfacechem import laws as every
+    from surfacechem.documents import document
+    from surfacechem.format.cases import read_laws
+    from surfacechem.runs.check import report
+    from surfacechem.runs.listing import law_list, law_page
+
+    own = [*read_laws(document.read(file), str(file))] if file else []
+    if check and not own:
+        raise InputError("gives no file to check: add `--from my_laws.py`.", Place(path="--check"))
+    if check:
+        text, well = report(own)
+        typer.echo(text)
+        raise typer.Exit(0 if well else DIFFERENT)
+    with every.known(own):
+        if name:
+            typer.echo(law_page(name))
+        else:
+            show(*law_list())
+
+
+@app.command(epilog=EXIT_CODES)
+def check(
+    case: CaseName,
+    changes: Changes = None,
+    solver: SolverName = None,
+    rtol: Tolerance = None,
+    accuracy: Accuracy = None,
+) -> None:
+    """Describe a case in words, without running it."""
+    from surfacechem.results.error_estimates import reasons
+    from surfacechem.runs.check import consistent_start, groups, start_warnings, warnings
+    from surfacechem.runs.summaries import check_summary, swept_in_words
+    from surfacechem.solve import AUTO
+
+    simulation = load_case(case, changes)
+    system, scene = simulation.system, simulation.case.scene
+    if system.is_static:
+        show(check_summary(simulation.case.title, system, scene, None, [], warnings(system)))
+        return
+    settings = run_settings(simulation, solver, rtol, accuracy)
+    model = simulation.model
+    values = model.values()
+    with simulation.case.locating():
+        problem = model.problem(settings, values)
+    if model.program.rates is None:  # its search finds the start
+        load_stepper()
+    start, end = consistent_start(model, values), settings.times[-1]
+    numbers = groups(model, scene, values, start, end)
+    found = [*warnings(system), *start_warnings(model, problem, start, end)]
+    why = reasons(problem, settings, system.has_moving_gap) if settings.solver == AUTO else ()
+    settings = model.chosen(settings, values)
+    swept = ""
+    if simulation.case.sweep is not None:
+        from surfacechem.runs.streaming import steps_of
+        from surfacechem.runs.sweeps import parameter_names
+
+        plan = simulation.plan()
+        swept = swept_in_words(plan, parameter_names(system, plan))
+        swept += f"; {steps_of(simulation)}" if simulation.case.sweep.keep else ""
+    show(check_summary(simulation.case.title, system, scene, settings, numbers, found, why, swept))
 
 
 @app.command(epilog=EXIT_CODES)
@@ -110,6 +224,82 @@ def run(
 
 
 @app.command(epilog=EXIT_CODES)
+def plot(
+    sources: Annotated[
+        list[str],
+        Argument(
+            metavar="FILE.nc|CASE...",
+            help="A dataset, a store (.zarr), or a case to run first; several go into one figure.",
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        written_to(".png, .svg or .pdf; default <name>.png, of a sweep <name>-sweep.png, of several comparison.png."),
+    ] = None,
+    variables: Annotated[str | None, Option("--variables", help="Variables to plot, separated by commas.")] = None,
+    against: Annotated[
+        str | None,
+        Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time or what is swept."),
+    ] = None,
+    celsius: Annotated[bool, Option("--celsius", help="Temperatures in degrees Celsius.")] = False,
+    changes: Changes = None,
+    talk: Verbose = None,
+) -> None:
+    """Plot runs over time or a variable, or sweeps over parameters."""
+    from surfacechem.results.netcdf import begin_reading
+
+    files = list(filter(is_dataset, sources))
+    if changes and len(files) == len(sources):
+        raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
+    for source in files:
+        begin_reading(Path(source))
+    from surfacechem import plots
+
+    shown = {source: plots.opened(source) for source in files}
+    own = Path(sources[0]).stem
+    if "sweep" in getattr(shown.get(sources[0]), "attrs", ()):
+        own = f"{own.removesuffix('-sweep')}-sweep"  # a sweep and a run of one name have a figure each
+    target = output or Path("comparison.png" if len(sources) > 1 else f"{own}.png")
+    check_picture(target)
+    solutions = {case: solve(load_case(case, changes).run, talk, brief=True) for case in sources if case not in shown}
+    shown |= {case: solution.data for case, solution in solutions.items()}
+    figure = plots.figure([shown[source] for source in sources], split_list(variables), against, celsius)
+    plots.write(figure, target)
+    if talk is not False:
+        typer.echo(str(target))
+    for solution in solutions.values():
+        leave_with(solution.status, solution.reason)
+
+
+@app.command(epilog=EXIT_CODES)
+def report(
+    source: Annotated[
+        str, Argument(metavar="FILE.nc|CASE", help="A dataset of a run or a sweep, or a case to run first.")
+    ],
+    output: Annotated[Path | None, written_to("HTML file; default <name>.html.")] = None,
+    changes: Changes = None,
+    talk: Verbose = None,
+) -> None:
+    """Write a report about a run or a sweep: one HTML page.
+
+    Scene, equations, figures, events, balances, error against run time. It needs no network.
+    """
+    from surfacechem.studies import run_report
+
+    is_file = is_dataset(source)
+    if is_file and changes:
+        raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
+    target = run_report.report_path(output or f"{Path(source).stem}.html")
+    refuse_unwritable(target)
+    solution = None if is_file else solve(load_case(source, changes).run, talk, brief=True)
+    solve(lambda: run_report.write(solution.dataset if solution else source, target), talk)
+    if talk is not False:
+        typer.echo(str(target))
+    if solution:
+        leave_with(solution.status, solution.reason)
+
+
+@app.command(epilog=EXIT_CODES)
 def sweep(
     case: CaseName,
     output: Annotated[
@@ -145,67 +335,32 @@ def sweep(
 
     A store (.zarr) may be of any size, is resumed where it was interrupted, and may be computed in parts.
     """
+    from tempfile import TemporaryDirectory
+
     from surfacechem.documents.document import assignments
     from surfacechem.results.netcdf import dataset_path
     from surfacechem.runs.summaries import sweep_summary
 
     simulation = load_case(case, changes)
     values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
-    if goes_to_store(output, {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}):
-        assert output is not None
-        plan = partial(simulation.plan, values, end)
-        return write_store(simulation, plan, output, talk, resume=resume, part=part, cluster=cluster, only=only)
+    if output is not None and output.suffix == ".zarr":
+        numbers, again = part_of(part), resume or part is not None
+        plan, store = plan_of_runs(output, only, again) if only else (simulation.plan(values, end), output)
+        return write_store(partial(simulation.stream, plan, store, resume=resume, part=numbers), talk, cluster)
+    for option, given in {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}.items():
+        if given:
+            raise InputError("belongs to a store: give `-o NAME.zarr`.", Place(path=option))
     target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
     refuse_unwritable(target, read=[simulation.case.file])
-    if simulation.case.sweep is not None and simulation.case.sweep.keep is not None:
-        return write_file(simulation, simulation.plan(values, end), target, talk)
+    if getattr(simulation.case.sweep, "keep", None) is not None:
+        plan = simulation.plan(values, end)
+        with TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
+            return write_store(partial(simulation.stream, plan, Path(folder) / "sweep.zarr"), talk, file=target)
     solution = solve(lambda: simulation.sweep(values, end), talk)
     solution.write(target)
     if talk is not False:
         show(sweep_summary(solution, target, details=talk is True))
     leave_with(solution.status)
-
-
-@app.command(epilog=EXIT_CODES)
-def check(
-    case: CaseName,
-    changes: Changes = None,
-    solver: SolverName = None,
-    rtol: Tolerance = None,
-    accuracy: Accuracy = None,
-) -> None:
-    """Describe a case in words, without running it."""
-    from surfacechem.results.error_estimates import reasons
-    from surfacechem.runs.check import consistent_start, groups, start_warnings, warnings
-    from surfacechem.runs.summaries import check_summary, swept_in_words
-    from surfacechem.solve import AUTO
-
-    simulation = load_case(case, changes)
-    system, scene = simulation.system, simulation.case.scene
-    if system.is_static:
-        show(check_summary(simulation.case.title, system, scene, None, [], warnings(system)))
-        return
-    settings = run_settings(simulation, solver, rtol, accuracy)
-    model = simulation.model
-    values = model.values()
-    with simulation.case.locating():
-        problem = model.problem(settings, values)
-    if model.program.rates is None:  # its search finds the start
-        load_stepper()
-    start, end = consistent_start(model, values), settings.times[-1]
-    numbers = groups(model, scene, values, start, end)
-    found = [*warnings(system), *start_warnings(model, problem, start, end)]
-    why = reasons(problem, settings, system.has_moving_gap) if settings.solver == AUTO else ()
-    settings = model.chosen(settings, values)
-    sweep = []
-    if simulation.case.sweep is not None:
-        from surfacechem.runs.streaming import steps_of
-        from surfacechem.runs.sweeps import parameter_names
-
-        plan = simulation.plan()
-        swept = swept_in_words(plan, parameter_names(system, plan))
-        sweep = [("sweep", swept if simulation.case.sweep.keep is None else f"{swept}; {steps_of(simulation)}")]
-    show(check_summary(simulation.case.title, system, scene, settings, numbers, found, why, sweep))
 
 
 @app.command(epilog=EXIT_CODES)
@@ -272,85 +427,6 @@ def equations(
 
 
 @app.command(epilog=EXIT_CODES)
-def laws(
-    name: Annotated[
-        str | None, Argument(help="Show this law, or all laws of this contract, in full.", autocompletion=law_names)
-    ] = None,
-    file: Annotated[
-        Path | None, Option("--from", metavar="FILE.py", help="A file with laws of your own; its code is executed.")
-    ] = None,
-    check: Annotated[
-        bool, Option("--check", help="Check the laws of the file: documentation, units, derivatives, thermodynamics.")
-    ] = False,
-) -> None:
-    """List the laws by contract, show one, or check laws of your own."""
-    from surfacechem import laws as every
-    from surfacechem.documents import document
-    from surfacechem.format.cases import read_laws
-    from surfacechem.runs.check import report
-    from surfacechem.runs.listing import law_list, law_page
-
-    own = [*read_laws(document.read(file), str(file))] if file else []
-    if check and not own:
-        raise InputError("gives no file to check: add `--from my_laws.py`.", Place(path="--check"))
-    if check:
-        text, well = report(own)
-        typer.echo(text)
-        raise typer.Exit(0 if well else DIFFERENT)
-    with every.known(own):
-        if name:
-            typer.echo(law_page(name))
-        else:
-            show(*law_list())
-
-
-@app.command()
-def schema() -> None:
-    """Print the JSON Schema of case files."""
-    from surfacechem.format.schema import text
-
-    typer.echo(text(), nl=False)
-
-
-@app.command(epilog=EXIT_CODES)
-def cases(
-    name: Annotated[str | None, Argument(help="Print this case.", autocompletion=case_names)] = None,
-) -> None:
-    """List the cases that come with the package, or print one."""
-    from surfacechem.runs.listing import case_table, case_text
-
-    if name:
-        typer.echo(case_text(name), nl=False)
-    else:
-        show(case_table())
-
-
-@app.command(epilog=EXIT_CODES)
-def new(
-    file: Annotated[
-        Path, Argument(metavar="FILE.yaml", help="The case file to write; an existing file is never overwritten.")
-    ],
-    like: Annotated[
-        str, Option("--from", metavar="NAME", help="The shipped case to copy.", autocompletion=case_names)
-    ] = "exothermic",
-) -> None:
-    """Start a case of your own from a shipped one."""
-    from surfacechem.results.netcdf import replacing
-    from surfacechem.runs.listing import case_text
-
-    if file.suffix.lower() not in (".yaml", ".yml"):
-        raise InputError(f"a case is YAML: give {file.with_suffix('.yaml').name}.", Place(path=str(file)))
-    if file.exists():
-        raise InputError("is there already; give another name.", Place(path=str(file)))
-    text = case_text(like)
-    with replacing(file) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    starts = ["run", "sweep"] if "\nsweep:" in text else ["run"]
-    commands = " or ".join(f"`surfacechem {start} {file}`" for start in starts)
-    typer.echo(f"{file}, from {like}. Next: `surfacechem check {file}`, then {commands}.")
-
-
-@app.command(epilog=EXIT_CODES)
 def mechanism(
     file: Annotated[str, Argument(metavar="FILE", help="A Cantera surface mechanism, or a shipped one.")],
     phase: Annotated[str | None, Option("--phase", help="The phase, where the file has several.")] = None,
@@ -388,107 +464,6 @@ def steady(
     from surfacechem.studies.steady import steady
 
     typer.echo(steady(case, of or (), changes or ()))
-
-
-@app.command(epilog=EXIT_CODES)
-def plot(
-    sources: Annotated[
-        list[str],
-        Argument(
-            metavar="FILE.nc|CASE...",
-            help="A dataset, a store (.zarr), or a case to run first; several go into one figure.",
-        ),
-    ],
-    output: Annotated[
-        Path | None,
-        written_to(".png, .svg or .pdf; default <name>.png, of a store <name>-sweep.png, of several comparison.png."),
-    ] = None,
-    variables: Annotated[str | None, Option("--variables", help="Variables to plot, separated by commas.")] = None,
-    against: Annotated[
-        str | None,
-        Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time or what is swept."),
-    ] = None,
-    celsius: Annotated[bool, Option("--celsius", help="Temperatures in degrees Celsius.")] = False,
-    changes: Changes = None,
-    talk: Verbose = None,
-) -> None:
-    """Plot runs over time or a variable, or sweeps over parameters."""
-    from surfacechem.results.netcdf import RUN_SUFFIXES, begin_reading
-
-    # By the suffix: a missing dataset must not be taken for the name of a case.
-    cases = [source for source in sources if not source.rstrip("/").endswith((*RUN_SUFFIXES, ".zarr"))]
-    if changes and not cases:
-        raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
-    # A store and a run of one name have a figure each.
-    stem, of_store = Path(sources[0]).stem, sources[0].rstrip("/").endswith(".zarr")
-    own = f"{stem.removesuffix('-sweep')}-sweep.png" if of_store else f"{stem}.png"
-    target = output or Path("comparison.png" if len(sources) > 1 else own)
-    check_picture(target)
-    for source in set(sources) - set(cases):
-        begin_reading(Path(source))
-    from surfacechem import plots
-
-    solutions = {case: solve(load_case(case, changes).run, talk, brief=True) for case in cases}
-    shown = [solutions[source].data if source in solutions else source for source in sources]
-    plots.write(plots.figure(shown, split_list(variables), against, celsius), target)
-    if talk is not False:
-        typer.echo(str(target))
-    for solution in solutions.values():
-        leave_with(solution.status, solution.reason)
-
-
-@app.command(epilog=EXIT_CODES)
-def figures(
-    name: Annotated[str, Argument(metavar="LIST", help="A list of figures, or a shipped one: paper, published.")],
-    output: Annotated[Path, Option("-o", "--output", help="Folder of the figures.")] = Path("figures"),
-    suffix: Annotated[str, Option("--format", help="svg, png or pdf.")] = "svg",
-    talk: Verbose = None,
-) -> None:
-    """Run and draw all figures of a list.
-
-    Each with its exact curve and the distance from it.
-    """
-    from surfacechem.studies.figures import read_list, write_all
-
-    content = read_list(name)
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made: {error.strerror}.", Place(path=str(output))) from None
-    check_picture(output / f"figure.{suffix}")
-
-    for target, caption in solve(lambda: write_all(content, output, suffix), talk):
-        if talk is not False:
-            typer.echo(f"{target}\n  {caption}")
-
-
-@app.command(epilog=EXIT_CODES)
-def report(
-    source: Annotated[
-        str, Argument(metavar="FILE.nc|CASE", help="A dataset of a run or a sweep, or a case to run first.")
-    ],
-    output: Annotated[Path | None, written_to("HTML file; default <name>.html.")] = None,
-    changes: Changes = None,
-    talk: Verbose = None,
-) -> None:
-    """Write a report about a run or a sweep: one HTML page.
-
-    Scene, equations, figures, events, balances, error against run time. It needs no network.
-    """
-    from surfacechem.results.netcdf import RUN_SUFFIXES
-    from surfacechem.studies import run_report
-
-    is_file = source.rstrip("/").endswith((*RUN_SUFFIXES, ".zarr"))
-    if is_file and changes:
-        raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
-    target = run_report.report_path(output or f"{Path(source).stem}.html")
-    refuse_unwritable(target)
-    solution = None if is_file else solve(load_case(source, changes).run, talk, brief=True)
-    solve(lambda: run_report.write(solution.dataset if solution else source, target), talk)
-    if talk is not False:
-        typer.echo(str(target))
-    if solution:
-        leave_with(solution.status, solution.reason)
 
 
 @app.command(epilog=EXIT_CODES)
@@ -579,6 +554,39 @@ def stability(
     settings = {"solvers": split_list(solvers), "rtol": rtol, "rounds": search}
     study = partial(studies.stability, *(regimes or ()), quick=quick)
     _run_study(study, settings, output or Path("stability"), talk)
+
+
+@app.command(epilog=EXIT_CODES)
+def figures(
+    name: Annotated[str, Argument(metavar="LIST", help="A list of figures, or a shipped one: paper, published.")],
+    output: Annotated[Path, Option("-o", "--output", help="Folder of the figures.")] = Path("figures"),
+    suffix: Annotated[str, Option("--format", help="svg, png or pdf.")] = "svg",
+    talk: Verbose = None,
+) -> None:
+    """Run and draw all figures of a list.
+
+    Each with its exact curve and the distance from it.
+    """
+    from surfacechem.studies.figures import read_list, write_all
+
+    content = read_list(name)
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be made: {error.strerror}.", Place(path=str(output))) from None
+    check_picture(output / f"figure.{suffix}")
+
+    for target, caption in solve(lambda: write_all(content, output, suffix), talk):
+        if talk is not False:
+            typer.echo(f"{target}\n  {caption}")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of case files."""
+    from surfacechem.format.schema import text
+
+    typer.echo(text(), nl=False)
 
 
 def _run_study(study: Callable[..., Study], settings: Mapping[str, Any], target: Path, talk: bool | None) -> None:

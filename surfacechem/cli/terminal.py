@@ -98,6 +98,7 @@ def _rendered(sheet: Sheet) -> Iterator[RenderableType]:
         facts = (
             (Text(label, style=COLOURS.get(label, "cyan")), Text(text, style="bold red" if ALARM in text else ""))
             for label, text in sheet.facts
+            if text
         )
         yield _grid(facts, indent=2)
     for heading, rows in sheet.tables.items():

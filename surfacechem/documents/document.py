@@ -68,12 +68,6 @@ class Tree:
         return InputError(message, self.place)
 
     @property
-    def blamed_place(self) -> Place:
-        """Place for errors of the value as a whole: that of an entry set from outside, else its own."""
-        entries = self.value.values() if isinstance(self.value, dict) else ()
-        return next((entry.place for entry in entries if entry.place.file == OVERRIDE), self.place)
-
-    @property
     def shown(self) -> str:
         """The value as written in messages."""
         kinds = {dict: "a mapping", list: "a list", type(None): "nothing", bool: str(self.value).lower()}

@@ -73,10 +73,7 @@ class Context:
 
 
 class Content(ABC):
-    """Content of a key: how it is read and how it is described."""
-
-    words: str = ""
-    """Description of the content for the documentation."""
+    """Content of a key: how it is read and which values are valid."""
 
     @abstractmethod
     def read(self, tree: Tree, name: str, context: Context) -> Any:
@@ -99,11 +96,6 @@ class Number(Content):
     word: str = ""
     wanted: str = ""
     """Description of the expected content, for the message about a mapping."""
-
-    @property
-    def words(self) -> str:  # type: ignore[override]
-        """Description: a quantity, and the word instead of it, if any."""
-        return f"quantity or `{self.word}`" if self.word else "quantity"
 
     def read(self, tree: Tree, name: str, context: Context) -> float | Varying | str:
         """Return the value in SI, or the word."""
@@ -154,11 +146,6 @@ class Integer(Content):
     wanted: str = ""
     """Description of the expected content, for the message if it is no number."""
 
-    @property
-    def words(self) -> str:  # type: ignore[override]
-        """Description: a number, and the word instead of it, if any."""
-        return f"number or `{self.word}`" if self.word else "number"
-
     def read(self, tree: Tree, name: str, context: Context) -> int | str:
         """Return the number, which may be written with an exponent, or the word."""
         if self.word and isinstance(tree.value, str) and not tree.value.isdigit():
@@ -186,8 +173,6 @@ def _bounded(schema: Schema, **limits: float) -> Schema:
 class Text(Content):
     """A text."""
 
-    words: str = "text"
-
     def read(self, tree: Tree, name: str, context: Context) -> str:
         """Return the text without surrounding white space."""
         return tree.text(name).strip()
@@ -205,11 +190,6 @@ class OneOf(Content):
     names: Callable[[], Iterable[str]]
     has: Callable[[str], bool] | None = None
     """Test of a single name, if listing all of them takes long."""
-
-    @property
-    def words(self) -> str:  # type: ignore[override]
-        """The names."""
-        return ", ".join(f"`{name}`" for name in self.names())
 
     def knows(self, value: object) -> bool:
         """True for one of the names."""
@@ -234,11 +214,6 @@ class ListOf(Content):
     at_least: int = 0
     """Least number of entries in the schema; the reader gives the reason when they are missing."""
 
-    @property
-    def words(self) -> str:  # type: ignore[override]
-        """Description of the entries."""
-        return f"list of {self.content.words}" if self.content.words else "list"
-
     def read(self, tree: Tree, name: str, context: Context) -> tuple[Any, ...]:
         """Return its entries."""
         law = self.content if isinstance(self.content, OneLaw) else None
@@ -262,11 +237,6 @@ class OneLaw(Content):
     """A law of a contract, ``name: {parameters}``, or its name alone if it needs none."""
 
     contract: type[Law]
-
-    @property
-    def words(self) -> str:  # type: ignore[override]
-        """The contract."""
-        return f"{self.contract.contract} laws"
 
     @property
     def example(self) -> str:
@@ -304,7 +274,6 @@ class Prescribed(Content):
 
     unit: str = "[x]"
     above_zero: bool = False
-    words: str = "history"
     definition: ClassVar[str] = "history"
 
     def read(self, tree: Tree, name: str, context: Context) -> Load:
@@ -334,7 +303,6 @@ class Prescribed(Content):
 class Temperature(Content):
     """The name of a temperature that is solved for, or a history."""
 
-    words: str = "name or history"
     definition: ClassVar[str] = "temperature"
 
     def read(self, tree: Tree, name: str, context: Context) -> str | Load:
@@ -360,7 +328,6 @@ class Nested(Content):
     cls: type[Section] | type[Law]
     per_area: bool = False
     """True if its quantities per area are so in every scene."""
-    words: str = "mapping"
 
     def read(self, tree: Tree, name: str, context: Context) -> Any:
         """Return the section or the law."""
@@ -438,12 +405,8 @@ class ByShape(Content):
     """Description of the expected content, for the message if it has none of these shapes."""
 
     @property
-    def words(self) -> str:  # type: ignore[override]
-        """Description of all shapes."""
-        return " or ".join(content.words for content in self._contents if content.words)
-
-    @property
-    def _contents(self) -> list[Content]:
+    def contents(self) -> list[Content]:
+        """Contents of all shapes."""
         return [content for content in (self.value, self.items, self.mapping) if content is not None]
 
     def read(self, tree: Tree, name: str, context: Context) -> Any:
@@ -460,7 +423,7 @@ class ByShape(Content):
 
     def schema(self) -> Schema:
         """Return the schema of any of the shapes."""
-        return {"anyOf": [content.schema() for content in self._contents]}
+        return {"anyOf": [content.schema() for content in self.contents]}
 
 
 @dataclass(frozen=True)
@@ -626,7 +589,9 @@ def read_law(law: type[L], tree: Tree, context: Context) -> L:
     if issubclass(law, Factor):
         of = tree.mapping().get("of", Tree(law_keys(law)["of"].default, tree.place))
         context = replace(context, x=context.units[of.choice("variable", context.units)])
-    with placed(tree.blamed_place):
+    # Errors of the law as a whole are those of an entry set from outside, else its own.
+    entries = tree.value.values() if isinstance(tree.value, dict) else ()
+    with placed(next((entry.place for entry in entries if entry.place.file == OVERRIDE), tree.place)):
         return law(**_values(law_keys(law), tree, context, law.name()), place=tree.place)
 
 

@@ -151,10 +151,6 @@ class Sample:
         u = SAMPLERS[self.method](own, self.runs, len(sources), self.seed)[where] + HALF_SPACING
         return {path: draw.at(u[:, sources.index(draw.source or path)]) for path, draw in self.draws.items()}
 
-    def of(self, path: str, index: Index) -> Array:
-        """Return the values of one parameter."""
-        return self.at(index)[path]
-
     @property
     def record(self) -> dict[str, Any]:
         """Entries from which the sample can be restored."""
@@ -531,7 +527,7 @@ def plan_of(
 
 def _scale(tree: Tree, unit: str) -> tuple[str, float, float]:
     """Return the unit of the first quantity of a tree, else that in SI, with its zero and its one in SI."""
-    found = (QUANTITY.fullmatch(str(each.value)) for each in tree.walk())
+    found = (QUANTITY.fullmatch(each.value) for each in tree.walk() if isinstance(each.value, str))
     name = next((quantity[2] for quantity in found if quantity and quantity[2]), unit)
     return name, parse(f"0 {name}", unit), parse(f"1 {name}", unit)
 
@@ -564,21 +560,18 @@ def _known(path: str, tree: Tree, units: Mapping[str, str]) -> str:
 
 def _axis(path: str, tree: Tree, units: Mapping[str, str], array: Array | None) -> Axis:
     path = _known(path, tree, units)
+    if array is not None and len(array) and np.isfinite(array).all():
+        # Equally spaced values are a range, so that neither a plan nor its record stores each of them.
+        spaced = EvenlySpaced(float(array[0]), float(array[-1]), len(array))
+        if np.array_equal(spaced.at(np.arange(len(array))), array):
+            return Axis(path, spaced)
     if array is not None:
-        return Axis(path, _as_range(array) or array.tolist())
+        return Axis(path, array.tolist())
     values = SWEPT.read(tree, path, Context(x=units[path]))
     if not isinstance(values, RangeSection):
         return Axis(path, list(values))
     logarithmic = _logarithmic(values)
     return Axis(path, EvenlySpaced(values.first, values.last, values.points, logarithmic), logarithmic)
-
-
-def _as_range(array: Array) -> EvenlySpaced | None:
-    """Return equally spaced values as a range, so that neither a plan nor its record stores each of them."""
-    if not (len(array) and np.isfinite(array).all()):
-        return None
-    spaced = EvenlySpaced(float(array[0]), float(array[-1]), len(array))
-    return spaced if np.array_equal(spaced.at(np.arange(len(array))), array) else None
 
 
 def _logarithmic(values: RangeSection | UniformSection) -> bool:

@@ -149,8 +149,15 @@ def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
         for law in surface.heat_laws:
             own = CurvedConductance(law=law, pair=surface, between=law.between, closure=law.closure, place=law.place)
             heat = (*heat, own)
+    if case.bodies:
+        first, second = (_body(*item) for item in case.bodies.items())
+    elif isinstance(case.interface.temperature, Load):  # reservoirs at the temperature of the interface
+        first, second = (Body(name, SHARED) for name in DEFAULT_BODIES)
+    else:
+        message = "the two bodies, of which the first is body 1, for example `bodies: {lower: {...}, upper: {...}}`"
+        raise case.tree.error(f"the case needs `bodies`: {message}; or `interface: {{temperature: 300 K}}`.")
     scene = Scene(
-        bodies=_bodies(case),
+        bodies=(first, second),
         interface=interface,
         surface=surface,
         heat=heat,
@@ -170,17 +177,6 @@ def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
     return replace(
         scene, interface=replace(scene.interface, temperature=SHARED), loading={SHARED: given, **scene.loading}
     )
-
-
-def _bodies(case: Document) -> tuple[Body, Body]:
-    """Return the two bodies; if omitted, reservoirs at the given temperature of the interface."""
-    if not case.bodies and not isinstance(case.interface.temperature, Load):
-        message = "the two bodies, of which the first is body 1, for example `bodies: {lower: {...}, upper: {...}}`"
-        raise case.tree.error(f"the case needs `bodies`: {message}; or `interface: {{temperature: 300 K}}`.")
-    if not case.bodies:
-        return Body(DEFAULT_BODIES[0], SHARED), Body(DEFAULT_BODIES[1], SHARED)
-    first, second = (_body(*item) for item in case.bodies.items())
-    return first, second
 
 
 def _body(name: str, section: BodySection) -> Body:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from surfacechem import laws
-from surfacechem.contracts.terms import BodyEnergy, Law, Load, Shape
+from surfacechem.contracts.terms import BodyEnergy, Load, Shape
 from surfacechem.format.data_files import KEY_MEANINGS
 from surfacechem.format.declarations import NODE_NAME, QUANTITY, Schema, closed, law_keys, reference, schema_of
 from surfacechem.format.sections import Document
@@ -32,10 +32,15 @@ def schema() -> Schema:
         },
     }
     for contract in CONTRACTS:
-        for name, law in laws.laws(contract).items():
-            kind = {} if _is_required(law) else {"type": ["object", "null"]}
+        found = laws.laws(contract)
+        # Laws that need no parameter may be given by their bare names.
+        bare = [name for name, law in found.items() if not any(key.required for key in law_keys(law).values())]
+        for name, law in found.items():
+            kind = {"type": ["object", "null"]} if name in bare else {}
             definitions[f"{contract.contract}.{name}"] = {**schema_of(law), **kind}
-        definitions[contract.contract] = _any_law(contract)
+        one = closed({name: reference(f"{contract.contract}.{name}") for name in found})
+        one |= {"minProperties": 1, "maxProperties": 1}
+        definitions[contract.contract] = {"anyOf": [one, {"enum": bare}]} if bare else one
     # Heights from a file replace the parameters of the law before it is read.
     heights = f"{Shape.contract}.heights"
     measured = {"type": "string", "description": "a CSV or netCDF file of x, y and z beside the case"}
@@ -54,17 +59,3 @@ def schema() -> Schema:
 def text() -> str:
     """Return the schema as JSON text."""
     return json.dumps(schema(), indent=2, ensure_ascii=False) + "\n"
-
-
-def _any_law(contract: type[Law]) -> Schema:
-    """Return the schema of one law: ``name: {...}``, or the bare name if nothing is required."""
-    found = laws.laws(contract)
-    properties = {name: reference(f"{contract.contract}.{name}") for name in found}
-    one = {**closed(properties), "minProperties": 1, "maxProperties": 1}
-    bare = [name for name, law in found.items() if not _is_required(law)]
-    return {"anyOf": [one, {"enum": bare}]} if bare else one
-
-
-def _is_required(law: type[Law]) -> bool:
-    """True if the law has a required parameter."""
-    return any(declared.required for declared in law_keys(law).values())

@@ -42,14 +42,6 @@ def has_surfaces(dataset: Data) -> bool:
     return {*FIELDS, "opposite_z", "approach", "force"} <= set(dataset)
 
 
-def draw_below(axes: Sequence[Axes], dataset: Data) -> None:
-    """Draw the surfaces on the last axes of a figure; the other axes share their x."""
-    for ax in axes[: -ROWS - 1]:
-        ax.sharex(axes[-ROWS - 1])
-        ax.tick_params(labelbottom=False)
-    draw(axes[-ROWS:], dataset)
-
-
 def draw(axes: Sequence[Axes], dataset: Data) -> None:
     """Draw the panels on axes of a figure, one below the other."""
     # Each panel has its own x axis, whose label needs space above the panel below.

@@ -38,7 +38,9 @@ def figure(scene: Scene) -> Figure:
     below = _given(scene)
     left = BESIDE if scene.heat else 0.1
     right = 0.85 if scene.tangential or any(name in scene.loading for name in HEATED_BODY) else 0.1
-    over = [scene.normal is not None or _has_far_heat_path(scene.bodies[1]), _has_far_heat_path(scene.bodies[0])]
+    # Temperatures beyond the far sides, to which heat passes.
+    far = [body.conduction.far if body.conduction else None for body in scene.bodies]
+    over = [scene.normal is not None or far[1] is not None, far[0] is not None]
     low, high = -HEIGHT - over[1] * OVER - LINE * len(below) - 0.15, GAP + HEIGHT + over[0] * OVER + 0.15
     with matplotlib.rc_context(style.STYLE):
         drawing = Figure(figsize=(left + WIDTH + right, high - low))
@@ -49,7 +51,10 @@ def figure(scene: Scene) -> Figure:
         lower, upper = scene.bodies
         _body(axes, lower, -HEIGHT)
         _body(axes, upper, GAP)
-        _interface(axes, scene)
+        axes.add_patch(Rectangle((0, 0), WIDTH, GAP, facecolor=MEDIUM, edgecolor=SPRING, hatch="..", alpha=0.6))
+        text = f"interface: {_temperature(scene.interface.temperature)}"
+        white = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+        axes.text(WIDTH / 2, GAP / 2, text, ha="center", va="center", fontsize=SIZE, bbox=white)
         _heat(axes, scene)
         _far_side(axes, lower, -HEIGHT, -1)
         _far_side(axes, upper, GAP + HEIGHT, 1)
@@ -80,15 +85,6 @@ def _body(axes: Axes, body: Body, bottom: float) -> None:
     middle = bottom + HEIGHT / 2
     axes.text(WIDTH / 2, middle + 0.26, body.name, ha="center", va="center", weight="bold", fontsize=9)
     axes.text(WIDTH / 2, middle + 0.12, "\n".join(lines), ha="center", va="top", fontsize=SIZE, linespacing=1.35)
-
-
-def _interface(axes: Axes, scene: Scene) -> None:
-    interface = scene.interface
-    axes.add_patch(Rectangle((0, 0), WIDTH, GAP, facecolor=MEDIUM, edgecolor=SPRING, hatch="..", alpha=0.6))
-    axes.text(
-        WIDTH / 2, GAP / 2, f"interface: {_temperature(interface.temperature)}", ha="center", va="center",
-        fontsize=SIZE, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
-    )  # fmt: skip
 
 
 def _arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], kind: str = "<->") -> None:
@@ -122,11 +118,6 @@ def _heat(axes: Axes, scene: Scene) -> None:
         level = GAP / 2 if k is None else levels[k]
         _arrow(axes, (WIDTH + 0.45, level), (WIDTH, level), "->")
         axes.text(WIDTH + 0.5, level, symbol(name), color=HEAT, va="center", fontsize=9)
-
-
-def _has_far_heat_path(body: Body) -> bool:
-    """True if heat passes the far side of a body."""
-    return body.conduction is not None and body.conduction.far is not None
 
 
 def _far_side(axes: Axes, body: Body, edge: float, way: int) -> None:
@@ -168,10 +159,7 @@ def _given(scene: Scene) -> list[str]:
         ("given", [symbol(name) for name in scene.loading]),
         ("stages", [stage.name for stage in scene.programme]),
     ]
-    return [line for word, names in rows if names for line in _wrapped(word, names)]
-
-
-def _wrapped(word: str, names: Sequence[str]) -> list[str]:
-    """Return a word and up to four names in lines, since a mechanism may have many reactions."""
-    text = f"{word}: {listed(list(dict.fromkeys(names)), 4)}"
-    return [text] if "$" in text else wrap(text, MOST_LETTERS, subsequent_indent="    ")
+    # Up to four names each, since a mechanism may have many reactions.
+    texts = [f"{word}: {listed(list(dict.fromkeys(names)), 4)}" for word, names in rows if names]
+    lines = ([text] if "$" in text else wrap(text, MOST_LETTERS, subsequent_indent="    ") for text in texts)
+    return [line for several in lines for line in several]

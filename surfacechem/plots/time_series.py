@@ -148,7 +148,10 @@ def _stacked(dataset: Data, shown: Sequence[Panel], against: str | None, balance
     with style.panels(6.4, height, rows + below, sharex=not below) as (plot, grid):
         axes = grid[:rows, 0].tolist()
         if below:
-            curved.draw_below(grid[:, 0].tolist(), dataset)
+            for ax in axes[:-1]:
+                ax.sharex(axes[-1])
+                ax.tick_params(labelbottom=False)
+            curved.draw(grid[rows:, 0].tolist(), dataset)
         first = None if against else first_shown(dataset, shown)
         for ax, panel in zip(axes, shown, strict=False):
             _draw(ax, dataset, panel, against or "time", first)

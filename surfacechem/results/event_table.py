@@ -198,11 +198,6 @@ def _ends(trajectory: Trajectory, mode: Any, value: float) -> bool:
     return bool(np.any((left + SIDE * result.t * rates)[edges] <= 0))
 
 
-def event_violations(jumps: Sequence[Jump]) -> list[str]:
-    """Return the names of transitions that have destroyed entropy, or would have."""
-    return list(dict.fromkeys(jump.edge.name for jump in jumps if jump.verdict != ADMISSIBLE))
-
-
 def event_counts(jumps: Sequence[Jump]) -> str:
     """List the names of the transitions with their counts."""
     names = [jump.edge.name for jump in jumps]

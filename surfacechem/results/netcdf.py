@@ -351,16 +351,6 @@ def save_table(target: Path, dataset: xarray.Dataset) -> None:
 
     Variables with other dimensions than the first one, events and profiles for instance, are in netCDF only.
     """
-    frame = table(dataset)
-    with replacing(target) as temporary:
-        if target.suffix.lower() == CSV:
-            frame.to_csv(temporary, index=False, lineterminator="\n")
-        else:
-            frame.to_parquet(temporary, index=False)
-
-
-def table(dataset: xarray.Dataset) -> Any:
-    """Return the pandas data frame of a dataset."""
     along = set(next(iter(dataset.data_vars.values())).dims)
     names = [name for name, item in dataset.data_vars.items() if item.dims and set(item.dims) <= along]
     with warnings.catch_warnings():
@@ -368,7 +358,12 @@ def table(dataset: xarray.Dataset) -> Any:
         warnings.simplefilter("ignore")
         frame = dataset[names].to_dataframe().reset_index()
     units = {name: dataset[name].attrs.get("units", "1") for name in frame if dataset[name].dtype.kind not in "OUT"}
-    return frame.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items()})
+    frame = frame.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items()})
+    with replacing(target) as temporary:
+        if target.suffix.lower() == CSV:
+            frame.to_csv(temporary, index=False, lineterminator="\n")
+        else:
+            frame.to_parquet(temporary, index=False)
 
 
 def reading(path: Path, read: Callable[[], R]) -> R:

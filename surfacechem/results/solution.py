@@ -20,11 +20,12 @@ from surfacechem.results.dataset import (
     quantity_columns,
     surface_columns,
 )
-from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
+from surfacechem.results.event_table import event_columns, event_findings, event_waits
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.results.refinement import refined
 from surfacechem.solve import solver
 from surfacechem.solve.contract import Status
+from surfacechem.solve.jumps import ADMISSIBLE
 from surfacechem.solve.run import Run, Trajectory
 
 RECORDED_SETTINGS = ("times", "picture", "atol", "max_steps")
@@ -171,6 +172,8 @@ class Solution(Results):
         """Global attributes: scalars and strings only."""
         run, result, balances = self.trajectory.run, self.trajectory.result, self.audit
         system = self.trajectory.model.system
+        # Transitions that have destroyed entropy, or would have.
+        refused = dict.fromkeys(jump.edge.name for jump in self.trajectory.jumps if jump.verdict != ADMISSIBLE)
         counts = result.counters._asdict()
         if not solver(run.solver).counts_rejected:
             del counts["rejected"]
@@ -198,7 +201,7 @@ class Solution(Results):
             "energy_error": balances.energy_error,
             "entropy_error": balances.entropy_error,
             "site_error": balances.site_error,
-            "entropy_violations": ", ".join((*balances.violations, *event_violations(self.trajectory.jumps))) or "none",
+            "entropy_violations": ", ".join((*balances.violations, *refused)) or "none",
             **({"detailed_balance": "; ".join(map(str, self.verdicts))} if self.verdicts else {}),
             "versions": versions(),
         }

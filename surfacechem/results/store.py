@@ -152,10 +152,10 @@ class Store:
         """The folder of the marks."""
         return self.path / MARKS_FOLDER
 
-    def write(self, number: int, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Write a chunk, its arrays side by side, and then its mark."""
+    def write(self, number: int, columns: Mapping[str, NDArray[Any]], threads: int = 1) -> None:
+        """Write a chunk, its arrays side by side in so many threads, and then its mark."""
         with self.writing():
-            with ThreadPoolExecutor() as pool:
+            with ThreadPoolExecutor(threads) as pool:
                 list(pool.map(partial(self._write, number, columns), self.layout.variables))
             self.mark(str(number), self.checksum(number))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -80,12 +79,6 @@ class Keep:
         return {f"{name}_{which}": (name, which) for which in SINGLE_COLUMNS for name in getattr(self, which)}
 
 
-def recorded_keep(record: str) -> Keep:
-    """Restore a selection from its record in a store."""
-    content: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(record).items()}
-    return Keep(**content)
-
-
 def end_of(run: Trajectory) -> dict[str, Any]:
     """Return the entries of END_COLUMNS for a run, without its balances."""
     steps = run.result.counters.steps
@@ -100,10 +93,13 @@ def balances_of(run: Trajectory, balances: Audit) -> dict[str, Any]:
 
 def keep_of(section: KeepSection | None, system: System) -> Keep:
     """Return the selection of a section, by default all ends, extremes and events; InputError for an unknown name."""
-    known = {"quantities": [*quantities(system)], "events": event_names(system), "states": [*system.own_states]}
+    # Events after which a run goes on are kinks and edges; terminal ones are reasons of ends.
+    kinks = [margin.name for margin in system.event_margins if not (margin.terminal or margin.peak)]
+    events = [*dict.fromkeys([*kinks, *(edge.name for edge in system.edges)])]
+    known = {"quantities": [*quantities(system)], "events": events, "states": [*system.own_states]}
     if section is None:
         every = tuple(known["quantities"])
-        return Keep(last=every, max=every, min=every, events=tuple(known["events"]))
+        return Keep(last=every, max=every, min=every, events=tuple(events))
     kinds = dict.fromkeys(("last", "max", "min", "series"), "quantities") | {"events": "events", "at_events": "states"}
     found: dict[str, tuple[str, ...]] = {}
     for key, kind in kinds.items():
@@ -116,12 +112,6 @@ def keep_of(section: KeepSection | None, system: System) -> Keep:
         if name not in known["quantities"]:
             raise section.error(f"nothing in this case is called '{name}'.", "reach")
     return Keep(**found, reach=dict(section.reach), balances=section.balances == ALL)
-
-
-def event_names(system: System) -> list[str]:
-    """Return the names of events after which a run goes on: kinks and edges. Terminal events are reasons of ends."""
-    kinks = [margin.name for margin in system.event_margins if not (margin.terminal or margin.peak)]
-    return list(dict.fromkeys([*kinks, *(edge.name for edge in system.edges)]))
 
 
 def reaching(system: System, keep: Keep) -> System:
@@ -232,7 +222,9 @@ class RunByRun:
 
     def _kept(self, run: Trajectory, balances: Audit | None, times: int) -> dict[str, Any]:
         result, keep = run.result, self.keep
-        row = end_of(run) | {"status": STATUSES.index(run.status), "reason": self._code(run.reason)}
+        # Reasons of runs end with times and numbers, which are no part of the code.
+        reason = max((text for text in self.reasons if run.reason.startswith(text)), key=len, default=OTHER_REASON)
+        row = end_of(run) | {"status": STATUSES.index(run.status), "reason": self.reasons.index(reason)}
         row |= balances_of(run, balances) if balances else {}
         last = at_end(run) if keep.last else {}
         row |= {f"{name}_last": last[name] for name in keep.last}
@@ -260,9 +252,3 @@ class RunByRun:
                 column = f"time_to_{name}"
                 row[column] = min(row.get(column, np.inf), float(run.discontinuities.t[where[0]]))
         return row
-
-    def _code(self, reason: str) -> int:
-        """Return the code of the longest entry of the reason table with which a reason begins."""
-        # Reasons of runs end with times and numbers, which are no part of the code.
-        fitting = [text for text in self.reasons if reason.startswith(text)]
-        return self.reasons.index(max(fitting, key=len, default=OTHER_REASON))

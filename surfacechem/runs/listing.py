@@ -34,13 +34,13 @@ class Sheet:
 
     title: str = ""
     facts: Sequence[tuple[str, str]] = ()
-    """Label and text of each."""
+    """Label and text of each; one without a text is left out."""
     tables: Mapping[str, Rows] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """Plain text."""
         lines = [self.title] if self.title else []
-        lines += [f"  {label:<10} {text}" for label, text in self.facts]
+        lines += [f"  {label:<10} {text}" for label, text in self.facts if text]
         for heading, rows in self.tables.items():
             lines += [heading] if heading and rows else []
             lines += [f"{'  ' if lines else ''}{line}" for line in columns(rows)] if rows else []
@@ -143,12 +143,9 @@ def law_table(contract: type[Law]) -> str:
     parts = [f"{contract.contract.upper()}: {_first_line(contract)}"]
     for law in laws(contract).values():
         texts = [_first_line(law), *formulas(law), *parameters(law), f"Source: {source(law)}"]
-        parts.append("\n".join([f"  {law.name()}", *map(_wrapped, texts)]))
+        wrapper = textwrap.TextWrapper(TEXT_WIDTH, " " * 6, " " * 10, break_on_hyphens=False)
+        parts.append("\n".join([f"  {law.name()}", *map(wrapper.fill, texts)]))
     return "\n\n".join(parts)
-
-
-def _wrapped(text: str) -> str:
-    return textwrap.fill(text, TEXT_WIDTH, initial_indent=" " * 6, subsequent_indent=" " * 10, break_on_hyphens=False)
 
 
 def _first_line(kind: type) -> str:
@@ -178,12 +175,6 @@ def source(law: type[Law]) -> str:
     return ROLE.sub(lambda m: plain(m[1]), text)
 
 
-def _apart(formula: str) -> str:
-    """Indent formulas, each on its own line if they are too long for one."""
-    several = formula if len(formula) < TEXT_WIDTH else formula.replace(",  ", ",\n").replace(";  ", ";\n")
-    return textwrap.indent(several, "    ")
-
-
 def law_page(name: str) -> str:
     """Describe all laws of that name, or of that contract: docstring, parameters and their ranges."""
     if asked := [contract for contract in FAMILIES if contract.contract == name]:
@@ -192,9 +183,16 @@ def law_page(name: str) -> str:
     found = [(contract, law) for contract, law in every if law.name() == name]
     if not found:
         raise InputError(f"no law '{name}'.{suggestion(name, {law.name() for _, law in every}, LAWS)}")
+
+    def apart(formula: re.Match[str]) -> str:
+        """Indent formulas, each on its own line if they are too long for one."""
+        text = plain(" ".join(formula[1].split()))
+        text = text if len(text) < TEXT_WIDTH else text.replace(",  ", ",\n").replace(";  ", ";\n")
+        return f"{textwrap.indent(text, '    ')}\n"
+
     pages = []
     for contract, law in found:
-        doc = FORMULA.sub(lambda m: f"{_apart(plain(' '.join(m[1].split())))}\n", f"{inspect.getdoc(law)}\n")
+        doc = FORMULA.sub(apart, f"{inspect.getdoc(law)}\n")
         text = textwrap.indent(ROLE.sub(lambda m: plain(m[1]), doc).rstrip(), "  ")
         listed = "\n".join(f"  {line}" for line in parameters(law)) or "  none"
         pages.append(f"{name} ({contract.contract})\n\n{text}\n\nParameters\n{listed}")

@@ -17,7 +17,7 @@ from surfacechem import solve as solvers
 from surfacechem.errors import InputError, Place
 from surfacechem.format.plans import recorded_plan
 from surfacechem.results.netcdf import Column, dataset_path, reading, save_kept
-from surfacechem.results.solution import Solution
+from surfacechem.results.solution import RECORDED_SETTINGS, Solution
 from surfacechem.runs.checking import check
 from surfacechem.runs.simulation import Simulation
 from surfacechem.runs.sweeps import SweepSolution
@@ -130,16 +130,10 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
     if solver not in solvers.names:
         raise record.error(f"no run is made with the solver '{solver}'.")
     try:
-        run = replace(
-            case.run,
-            solver=solver,
-            rtol=rtol,
-            times=tuple(departures.get("times", case.run.times)),
-            picture=departures.get("picture", case.run.picture),
-            atol=departures.get("atol", case.run.atol),
-            max_steps=departures.get("max_steps", case.run.max_steps),
-            max_seconds=None,  # a limit of wall-clock time is not reproducible
-        )
+        usual = case.run
+        settings = {name: departures.get(name, getattr(usual, name)) for name in RECORDED_SETTINGS}
+        # A limit of wall-clock time is not reproducible.
+        run = replace(usual, solver=solver, rtol=rtol, max_seconds=None, **settings)
         plan = recorded_plan(record.attribute("sweep", str)) if "sweep" in record.attributes else None
     except InputError as error:
         raise error.at(record.place) from None
@@ -162,7 +156,7 @@ def _departures(record: Record) -> Mapping[str, Any]:
     numbers += [found["picture"]] if found.get("picture") is not None else []
     if not all(isinstance(value, float | int) and math.isfinite(value) for value in numbers):
         raise record.error("the attribute 'departures' holds what is no number where one is needed.")
-    return found
+    return found | ({"times": tuple(found["times"])} if "times" in found else {})
 
 
 def differences(record: Record, solution: Solution | SweepSolution | KeptSweep) -> list[str]:

@@ -93,7 +93,7 @@ class ChunkRuns:
     def steps(self) -> str:
         """How the runs are stepped, in words."""
         if self.lanes is not None:
-            return f"eight runs at once, {self.lanes.words}"
+            return f"eight runs at once, by {self.lanes.words}"
         if self.arrays is None:
             return f"one run after another, each prepared in Python, by {self.run.solver}"
         return f"one run after another in the compiled loop, by {self.run.solver}"
@@ -197,8 +197,8 @@ def _runs_of(job: Job) -> ChunkRuns:
     from surfacechem.runs.simulation import Simulation
 
     case = cases.load_text(job.case, job.name, mechanism_text=job.mechanism, allow_code=True)
-    plan, keep, changes = recorded_plan(job.plan), keeping.recorded_keep(job.keep), json.loads(job.changes)
-    return ChunkRuns(Simulation(case), plan, keep, changes, run=job.run)
+    kept: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(job.keep).items()}
+    return ChunkRuns(Simulation(case), recorded_plan(job.plan), Keep(**kept), json.loads(job.changes), run=job.run)
 
 
 def columns_of(job: Job, index: Index) -> Columns:
@@ -253,7 +253,8 @@ class Stream:
                     failed += int(np.sum(columns["status"] >= STATUSES.index("failed")))
                     on_progress(Progress(runs, done, failed, resumed))
                 # Only this thread writes, so that chunks and their marks are written in order.
-                self.store.write(number, {name: np.concatenate([each[name] for each in parts]) for name in parts[0]})
+                columns = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
+                self.store.write(number, columns, threads or processors())
         return self.store
 
     def check(self, threads: int | None = None) -> Checked | None:

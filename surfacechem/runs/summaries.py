@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from surfacechem.runs.streaming import Stream
     from surfacechem.runs.sweeps import SweepSolution
     from surfacechem.scene import Scene
-    from surfacechem.solve.run import Run
+    from surfacechem.solve.run import Model, Run
 
 REGIMES = {
     "isothermal": "bodies and interface are held at one temperature; the heat that this takes is an output.",
@@ -81,43 +81,47 @@ def run_summary(solution: Solution, written: Path | None, details: bool = False)
     """Summarise a run: states, solver, end, accuracy, speed and file; with ``details`` errors, counts and events."""
     from surfacechem.solve import solver
 
-    trajectory, audit, counters = solution.trajectory, solution.audit, solution.trajectory.result.counters
-    run, model = trajectory.run, trajectory.model
-    speed = f"run {duration(trajectory.seconds)}, compile {duration(model.compile_seconds)}"
-    if model.system.in_totals:
-        speed = f"surfaces {duration(solution.integrals_seconds)}, {speed}"
-    jumped = event_summary(trajectory.jumps, audit.energy_scale, model.system.unit("J/m^2"))
+    trajectory, counters = solution.trajectory, solution.trajectory.result.counters
+    run, system, jumps = trajectory.run, trajectory.model.system, trajectory.jumps
     rejected = f", {counters.rejected} rejected" if solver(run.solver).counts_rejected else ""
+    steps = f"{counters.steps} steps{rejected}, {counters.residuals} residuals"
+    integrals = solution.integrals_seconds if system.in_totals else 0.0
     facts = [
-        ("solved", _solved(model.system, run)),
+        ("solved", _solved(system, run)),
         (solution.status, solution.reason),
-        *([("error", _accuracy(solution.accuracy))] if solution.accuracy else []),
-        ("time", f"{speed}; {counters.steps} steps{rejected}, {counters.residuals} residuals"),
-        *([("events", jumped)] if trajectory.jumps else []),
-        ("balances", _balances(audit, model.system.unit("W/(m^2 K)"))),
+        ("error", _accuracy(solution.accuracy) if solution.accuracy else ""),
+        ("time", f"{_speed(trajectory.seconds, trajectory.model, integrals)}; {steps}"),
+        ("events", event_summary(jumps, solution.audit.energy_scale, system.unit("J/m^2")) if jumps else ""),
+        ("balances", _balances(solution.audit, system.unit("W/(m^2 K)"))),
         *(("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
         *(("warning", warning) for warning in solution.warnings),
-        *([("written", str(written))] if written else []),
+        ("written", str(written or "")),
     ]
-    return Sheet(solution.title or "untitled", facts, run_details(solution) if details else {})
+    return Sheet(solution.title or "untitled", facts, _details(solution) if details else {})
 
 
-def run_details(solution: Solution) -> dict[str, Rows]:
+def _details(solution: Solution) -> dict[str, Rows]:
     """Return tables of the error of each variable, of all counts, and of the events of a run."""
-    found = {name: value for name, value in solution.attributes.items() if name.startswith("count_")}
-    errors = solution.accuracy.everywhere if solution.accuracy else {}
     jumps = solution.trajectory.jumps
+    errors = solution.accuracy.everywhere if solution.accuracy else {}
+    counts = [(name, value) for name, value in solution.attributes.items() if name.startswith("count_")]
     more = [("...", f"{len(jumps) - MOST_EVENTS} more", "")] if len(jumps) > MOST_EVENTS else []
     return {
         "Errors": [(name, f"{error:.2g}") for name, error in errors.items()],
-        "Counts": [(name.removeprefix("count_"), str(value)) for name, value in found.items()],
+        "Counts": [(name.removeprefix("count_"), str(value)) for name, value in counts],
         "Events": [(f"{j.t:.9g} s", j.edge.name, j.verdict) for j in jumps[:MOST_EVENTS]] + more,
     }
 
 
+def _speed(seconds: float, model: Model, integrals: float) -> str:
+    """Describe the times of runs, of compilation, and of integrals over surfaces if there are any."""
+    surfaces = f"surfaces {duration(integrals)}, " if model.system.in_totals else ""
+    return f"{surfaces}run {duration(seconds)}, compile {duration(model.compile_seconds)}"
+
+
 def _solved(system: System, run: Run, steps: str = "") -> str:
     """Describe a system and how it was solved; ``steps`` in words if another method than the solver's took them."""
-    return f"{states(system)}; {system.regime}; {steps.removeprefix('by ') or run.solver} at rtol {run.rtol:g}"
+    return f"{states(system)}; {system.regime}; {steps or run.solver} at rtol {run.rtol:g}"
 
 
 def _accuracy(accuracy: Accuracy) -> str:
@@ -153,14 +157,12 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
         known = accuracy.known
         error = f"{known.max():.2g} ({accuracy.source})" if len(known) else f"unknown ({accuracy.source})"
         error = "; ".join(filter(None, (error, accuracy.unknown)))
-    speed = f"run {duration(solution.seconds)}, compile {duration(solution.model.compile_seconds)}"
-    if solution.system.in_totals:
-        speed = f"surfaces {duration(solution.before_seconds)}, {speed}"
+    speed = _speed(solution.seconds, solution.model, solution.before_seconds)
     energy, entropy, sites = (f"{solution.worst(balance):.1e}" for balance in ("energy", "entropy", "site"))
     count = sum(audit.destroys for audit in solution.audits)
     verdict = f"ENTROPY DESTROYED in {counted(count, 'run')}" if count else "no law destroys entropy"
     verdict += ", jumps do" if any(entropy_destroyed(run.jumps) for run in solution.runs) else ""
-    every = [
+    facts = [
         ("swept", swept_in_words(solution.plan, solution.parameters)),
         ("solved", _solved(solution.system, solution.run)),
         ("ended", f"{counted(len(solution.runs), 'run')}: {solution.ends}"),
@@ -170,18 +172,18 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
         ("balances", f"energy {energy}, entropy {entropy}, sites {sites}; {verdict}"),
         ("written", str(written or "")),
     ]
-    facts = [(label, text) for label, text in every if text]
-    return Sheet(solution.title or "untitled", facts, sweep_details(solution) if details else {})
+    return Sheet(solution.title or "untitled", facts, {"Runs": _run_rows(solution)} if details else {})
 
 
-def sweep_details(solution: SweepSolution) -> dict[str, Rows]:
-    """Return a table of the ends of the runs of a sweep, or of the first ones, with their parameters."""
+def _run_rows(solution: SweepSolution) -> Rows:
+    """Return rows with the ends of the runs of a sweep, or of the first ones, and their parameters."""
     errors = [f"error {error:.2g}" for error in solution.accuracy.errors] if solution.accuracy else [""] * MOST_RUNS
     shown = range(min(len(solution.runs), MOST_RUNS))
     runs = zip(_points_told(solution, shown), solution.runs, errors, strict=False)
     rows = [(given, run.status, error, run.reason) for given, run, error in runs]
-    more = len(solution.runs) - len(shown)
-    return {"Runs": [*rows, *([("...", f"{more} more", "", "")] if more else [])]}
+    if more := len(solution.runs) - len(shown):
+        rows.append(("...", f"{more} more", "", ""))
+    return rows
 
 
 def _points_told(solution: SweepSolution, numbers: Sequence[int]) -> list[str]:
@@ -210,20 +212,16 @@ def swept_in_words(plan: Plan, names: Mapping[str, str]) -> str:
 def points_summary(found: PointResults, written: Path | None) -> Sheet:
     """Summarise points: quantities and non-zero derivatives of a single one; of many, their number and the file."""
     refused = [(i, why) for i, why in enumerate(found.refused) if why]
-    facts, rows, count = [], [], len(found.refused)
+    rows, count, derivatives = [], len(found.refused), len(found.slopes)
+    fact = "points", f"{count}, with {len(found.values)} quantities and {derivatives} derivatives each"
     if count == 1:
-        shown = [*found.values, *(slope for slope in found.slopes if slope.values[0])]
-        rows = [(c.name, f"{c.values[0]:.12g}", c.unit, c.long_name) for c in shown]
-        zero = len(found.values) + len(found.slopes) - len(shown)
-        facts += [("zero", f"{zero} derivatives, which are not listed")] if zero else []
-    else:
-        text = f"{count}, with {len(found.values)} quantities and {len(found.slopes)} derivatives each"
-        facts.append(("points", text))
-    if refused:
-        more = f", and {len(refused) - 1} more" if len(refused) > 1 else ""
-        facts.append(("refused", f"point {refused[0][0]}: {refused[0][1]}{more}"))
-    facts += [("written", str(written))] if written else []
-    return Sheet(found.title or "untitled", facts, {"": rows})
+        slopes = [slope for slope in found.slopes if slope.values[0]]
+        rows = [(c.name, f"{c.values[0]:.12g}", c.unit, c.long_name) for c in (*found.values, *slopes)]
+        zero = derivatives - len(slopes)
+        fact = "zero", f"{zero} derivatives, which are not listed" if zero else ""
+    more = f", and {len(refused) - 1} more" if len(refused) > 1 else ""
+    why = f"point {refused[0][0]}: {refused[0][1]}{more}" if refused else ""
+    return Sheet(found.title or "untitled", [fact, ("refused", why), ("written", str(written or ""))], {"": rows})
 
 
 def _sweep_events(solution: SweepSolution) -> str:
@@ -252,9 +250,9 @@ def check_summary(
     groups: Sequence[Group],
     warnings: Sequence[str],
     choices: Sequence[Sequence[str]] = (),
-    sweep: Sequence[tuple[str, str]] = (),
+    sweep: str = "",
 ) -> Sheet:
-    """Describe a scene in words, with its dimensionless numbers and warnings; ``sweep`` are facts of its sweep."""
+    """Describe a scene in words, with its dimensionless numbers and warnings; ``sweep`` describes its sweep."""
     sections: dict[str, Sequence[Sequence[str]]] = {
         "Choices": choices,
         "States": _state_rows(system),
@@ -267,9 +265,12 @@ def check_summary(
         "Numbers": [(g.name, f"{g.value:.4g} {g.unit if g.unit != '1' else ''}".rstrip(), g.text) for g in groups],
         "Warnings": [(warning,) for warning in warnings],
     }
-    facts = [("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"), ("run", _plan(system, run))]
-    facts += [("compiled", _compiled(system, run))] if run is not None else []
-    facts += sweep
+    facts = [
+        ("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"),
+        ("run", _plan(system, run)),
+        ("compiled", _compiled(system, run) if run is not None else ""),
+        ("sweep", sweep),
+    ]
     return Sheet(title or "untitled", facts, sections)
 
 
@@ -357,12 +358,14 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
     return rows
 
 
-def _worst(stream: Stream, chunks: Sequence[int]) -> str:
-    """Describe the worst energy balance of some chunks of a store."""
-    if not stream.chunks.keep.balances:
-        return "not kept"
-    errors = [np.fmax.reduce(stream.store.read("energy_error", number), initial=0.0) for number in chunks]
-    return f"energy {np.fmax.reduce(errors, initial=0.0):.1e} at worst"
+def _store_balances(stream: Stream, chunks: Sequence[int], checked: Checked | None) -> str:
+    """Describe the worst energy balance of some chunks of a store, and the runs that destroy entropy."""
+    told = "not kept"
+    if stream.chunks.keep.balances:
+        errors = [np.fmax.reduce(stream.store.read("energy_error", number), initial=0.0) for number in chunks]
+        told = f"energy {np.fmax.reduce(errors, initial=0.0):.1e} at worst"
+    destroys = checked.destroys if checked is not None else 0
+    return told + (f"; ENTROPY DESTROYED in {counted(destroys, 'run')}" if destroys else "")
 
 
 def store_summary(stream: Stream, store: Store, checked: Checked | None, file: Path | None = None) -> tuple[str, Sheet]:
@@ -377,15 +380,12 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
         ends += np.bincount(store.read("status", number), minlength=len(STATUSES))
     names = parameter_names(chunks.model.system, chunks.plan)
     words = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
-    error = str(checked or "")
-    destroys = checked.destroys if checked is not None else 0
-    destroyed = f"; ENTROPY DESTROYED in {counted(destroys, 'run')}" if destroys else ""
     facts = [
         ("swept", swept_in_words(chunks.plan, names)),
-        ("solved", _solved(chunks.model.system, chunks.run, getattr(chunks.lanes, "words", ""))),
+        ("solved", _solved(chunks.model.system, chunks.run, chunks.lanes.words if chunks.lanes else "")),
         ("ended", f"{ends.sum()} of {counted(chunks.plan.size, 'run')}: {words}"),
-        *([("error", error)] if error else []),
-        ("balances", f"{_worst(stream, done)}{destroyed}"),
+        ("error", str(checked or "")),
+        ("balances", _store_balances(stream, done, checked)),
         ("written", str(file) if file else f"{store.path}, {len(done)} of {layout.chunks} chunks"),
     ]
     stopped = ends[STATUSES.index("stopped")] == ends.sum()

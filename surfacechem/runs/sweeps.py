@@ -217,42 +217,40 @@ def accuracy(
     """Return the error of each run, from the exact solution of the case, else from a second sweep; NaN if it is
     unknown. ``cells`` finds the errors of the cells across bodies of each run.
     """
-    unused, named = case.unused, case.reference
+    unused, named, found = case.unused, case.reference, None
     second = cache(lambda: _second(done, threads))
     # Options of a reference belong to the case as written, and fit no other run.
     if named is not None and not named.options:
         try:
-            return _held(done, _against_exact(case, done, named.name, second))
+            found = _against_exact(case, done, named.name, second)
         except InputError as error:
             unused = f"the exact solution {named.name} does not apply to this scene: {error.message.rstrip('.')}"
     elif named is not None:
         unused = named.fixed
-    left = cells()
-    errors, why = _estimated(done, second(), left)
-    source = ", ".join([second_run(second().run, "sweep"), *dict.fromkeys(f.source for f in left if f.variables)])
-    return _held(done, SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))), why=why))
-
-
-def _held(done: SweepSolution, found: SweepAccuracy) -> SweepAccuracy:
-    """Add a note if errors exceed the requested accuracy: the runs of a sweep share one tolerance, and none is repeated
-    at a tighter one.
-    """
+    found = found or _estimated(done, second(), cells(), unused)
     wanted = done.run.accuracy
     if wanted is None or not np.any(found.known > wanted):
         return found
+    # The runs of a sweep share one tolerance, and none is repeated at a tighter one.
     missed = f"{wanted:.0e} was asked, which takes a tighter `rtol` under `run` here"
     return replace(found, source=f"{found.source}; {missed}")
 
 
-def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellErrors]) -> tuple[list[float], str]:
-    """Return the errors of all runs from a second sweep, with those of cells, and the reason if one is unknown."""
+def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellErrors], unused: str) -> SweepAccuracy:
+    """Return the errors of all runs from a second sweep, with those of cells; ``unused`` is the reason against an exact
+    solution.
+    """
     if done.statistics:
         pairs = zip(done.statistics, second.statistics, cells, strict=True)
         errors = [_of_statistics(ours, theirs) + found.largest for ours, theirs, found in pairs]
-        return errors, UNBROKEN if all(found.converged for found in cells) else CELLS_UNKNOWN
-    runs = zip(done.runs, second.runs, cells, strict=True)
-    found = [with_cells(estimated(ours, theirs), each) for ours, theirs, each in runs]
-    return [each.error for each in found], next((each.source for each in found if np.isnan(each.error)), "")
+        why = UNBROKEN if all(found.converged for found in cells) else CELLS_UNKNOWN
+    else:
+        runs = zip(done.runs, second.runs, cells, strict=True)
+        estimates = [with_cells(estimated(ours, theirs), each) for ours, theirs, each in runs]
+        errors = [each.error for each in estimates]
+        why = next((each.source for each in estimates if np.isnan(each.error)), "")
+    source = ", ".join([second_run(second.run, "sweep"), *dict.fromkeys(f.source for f in cells if f.variables)])
+    return SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))), why=why)
 
 
 def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
@@ -304,8 +302,14 @@ def _of_statistics(found: Rupture, exact: references.Reference | Rupture) -> flo
 
 
 def parameter_names(system: System, plan: Plan) -> dict[str, str]:
-    """Return the paths of the swept parameters by their names in the dataset: the shortest unique tails of paths."""
-    taken = _column_names(system)
+    """Return the paths of the swept parameters by their names in the dataset: the shortest unique tails of paths, which
+    no column or dimension of a file or store may have.
+    """
+    kept, shown = keep_of(None, system), {DATASET_NAMES.get(name, name) for name in quantities(system)}
+    stored = described(system, replace(kept, at_events=kept.last, reach=dict.fromkeys(kept.last, 0.0)))
+    more = [f"{name}_{which}" for name in shown for which in (*EXTREMES, *STATISTICS, "before", "after")]
+    exact = [f"{name}_exact" for name in (*more, "lifetime")]
+    taken = {*kept.last, *shown, *system.interior, *stored, *END_COLUMNS, *more, *exact, *RESERVED_COLUMNS}
     found: dict[str, str] = {}
     for path in plan.paths:
         parts = name_parts(path)
@@ -313,17 +317,6 @@ def parameter_names(system: System, plan: Plan) -> dict[str, str]:
         free = (name for name in names if name not in taken | set(found) and not name.startswith(COLUMN_PREFIXES))
         found[next(free, f"{names[-1]}_swept")] = path
     return found
-
-
-def _column_names(system: System) -> set[str]:
-    """Return the names that columns and dimensions of a file or store of a sweep may have, except those of
-    COLUMN_PREFIXES.
-    """
-    kept, shown = keep_of(None, system), {DATASET_NAMES.get(name, name) for name in quantities(system)}
-    stored = described(system, replace(kept, at_events=kept.last, reach=dict.fromkeys(kept.last, 0.0)))
-    more = [f"{name}_{which}" for name in shown for which in (*EXTREMES, *STATISTICS, "before", "after")]
-    exact = [f"{name}_exact" for name in (*more, "lifetime")]
-    return {*kept.last, *shown, *system.interior, *stored, *END_COLUMNS, *more, *exact, *RESERVED_COLUMNS}
 
 
 def dimensions(plan: Plan, names: Mapping[str, str]) -> dict[str, int]:
@@ -337,7 +330,8 @@ def parameter_columns(system: System, plan: Plan, names: Mapping[str, str]) -> l
     columns = []
     sample, drawn = plan.sample, set(plan.sample.draws) if plan.sample else set()
     values = {axis.path: LazyArray(axis.at, len(axis)) for axis in plan.axes}
-    values |= {path: LazyArray(partial(sample.of, path), sample.runs) for path in drawn} if sample else {}
+    for path in drawn if sample else ():
+        values[path] = LazyArray(lambda index, path=path: sample.at(index)[path], sample.runs)  # type: ignore[misc, union-attr]
     for name, path in names.items():
         state = next((s for s in system.states if s.path == path), None)
         if state is not None:

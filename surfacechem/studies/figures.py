@@ -210,14 +210,14 @@ class ListFigure:
     def _label(self, ax: Any) -> None:
         x, y = self.section.x, self.section.y
         ax.set(xlabel=x.name, ylabel=y.name, xscale=x.scale, yscale=y.scale)
-        beside = [ax.plot([], [], label="exact", **EXACT_STYLE)] if self._any("exact") else []
-        beside += [ax.plot([], [], "o", color="0.4", markersize=4, label="published")] if self._any("data") else []
-        beside += [ax.plot([], [], ":", color="0.4", label="breaks the second law")] if self._any("refused") else []
-        if beside or any(curve.label for curve in self.curves):
+        if any(curve.exact is not None and np.any(curve.exact) for curve in self.curves):
+            ax.plot([], [], label="exact", **EXACT_STYLE)
+        if any(curve.data is not None and np.any(curve.data) for curve in self.curves):
+            ax.plot([], [], "o", color="0.4", markersize=4, label="published")
+        if any(curve.refused.any() for curve in self.curves):
+            ax.plot([], [], ":", color="0.4", label="breaks the second law")
+        if ax.get_legend_handles_labels()[1]:
             ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-
-    def _any(self, what: str) -> bool:
-        return any(np.any(getattr(curve, what)) for curve in self.curves if getattr(curve, what) is not None)
 
 
 def lists() -> Path:

@@ -73,23 +73,13 @@ MEANING = {
 }
 
 
-@dataclass(frozen=True)
-class Errors:
-    """Errors by kind and variable; errors of event times belong to no variable, and there may be none."""
+Errors = Mapping[tuple[str, str], float]
+"""Errors by kind and variable; errors of event times belong to no variable, and there may be none."""
 
-    by_kind: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: {kind: {} for kind in MEANING})
 
-    def worst(self, *kinds: str) -> float:
-        """Return the largest error over the variables; NaN if there is none."""
-        return float(np.max([error for kind in kinds for error in self.by_kind[kind].values()] or [math.nan]))
-
-    def larger(self, other: Errors) -> Errors:
-        """Return the larger of two errors for each kind and variable."""
-        found = {}
-        for kind, errors in self.by_kind.items():
-            names = dict.fromkeys((*errors, *other.by_kind[kind]))
-            found[kind] = {name: max(errors.get(name, 0.0), other.by_kind[kind].get(name, 0.0)) for name in names}
-        return Errors(found)
+def worst(errors: Errors, *kinds: str) -> float:
+    """Return the largest error of these kinds over the variables; NaN if there is none."""
+    return float(np.max([error for (kind, _), error in errors.items() if kind in kinds] or [math.nan]))
 
 
 def mean_square(times: Array, error: Array) -> float:
@@ -166,7 +156,7 @@ class Truth:
     events: Values
     end: float
     """Requested end of the run [s]."""
-    uncertainty: Errors = field(default_factory=Errors)
+    uncertainty: Errors = field(default_factory=dict)
 
     @classmethod
     def of(cls, run: Trajectory, source: str, variables: Sequence[str]) -> Truth:
@@ -181,18 +171,14 @@ class Truth:
         both = [(events.get(name, ()), times) for name, times in self.events.items()]
         pairs = [pair for found, times in both if len(found) == len(times) for pair in zip(found, times, strict=True)]
         alike = clear_of(self.times, pairs)
-        found = {
-            name: np.where(alike[: len(error)], error, 0.0)
-            for name, error in errors_over_time(values, self.values, self.floors).items()
-        }
-        return Errors(
-            {
-                "final": {name: float(error[-1]) for name, error in found.items()},
-                "max": {name: float(error.max()) for name, error in found.items()},
-                "l2": {name: mean_square(self.times[: len(error)], error) for name, error in found.items()},
-                "event": dict(zip([""], event_errors(events, self.events, self.end).values(), strict=False)),
-            }
-        )
+        found: dict[tuple[str, str], float] = {}
+        for name, every in errors_over_time(values, self.values, self.floors).items():
+            error = np.where(alike[: len(every)], every, 0.0)
+            found["final", name], found["max", name] = float(error[-1]), float(error.max())
+            found["l2", name] = mean_square(self.times[: len(error)], error)
+        for worst_of_events in event_errors(events, self.events, self.end).values():
+            found["event", ""] = worst_of_events
+        return found
 
     def objection(self, trajectory: Trajectory) -> str:
         """Return the reason why a run has no errors: it failed, or ended otherwise; empty if it has."""
@@ -242,15 +228,12 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
     whole, others = Truth.of(trajectory, "", variables), [name for name in variables if name not in known]
     beside = numerical(subject, others) if others or event_times(trajectory) else whole
     beside = replace(beside, floors=whole.floors)
-    noise = replace(beside, times=result.times, values=known, events={}).errors(moved, {}).by_kind
-    uncertain = {
-        kind: {**errors, **{name: error + EPS for name, error in noise[kind].items()}}
-        for kind, errors in beside.uncertainty.by_kind.items()
-    }
+    noise = replace(beside, times=result.times, values=known, events={}).errors(moved, {})
+    uncertain = {**beside.uncertainty, **{key: error + EPS for key, error in noise.items()}}
     others += ["events"] if beside.events else []
     source = f"exact solution {reference.name}" + (f"; {', '.join(others)}: {beside.source}" if others else "")
     values = {**beside.values, **known}
-    return replace(beside, source=source, times=result.times, values=values, uncertainty=Errors(uncertain))
+    return replace(beside, source=source, times=result.times, values=values, uncertainty=uncertain)
 
 
 def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
@@ -276,15 +259,16 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
     if not largest <= AGREEMENT:
         raise InputError(f"{name} has no reference: the methods that agree best, {methods}, differ by {largest:.1e}.")
     source = f"{methods}, extrapolated from rtol {MIN_RTOL * TEN:.0e} and {MIN_RTOL:.0e}"
-    apart = first.errors(second.values, second.events)
-    return replace(first, source=source, uncertainty=apart.larger(first.uncertainty))
+    apart, own = first.errors(second.values, second.events), first.uncertainty
+    larger = {key: max(apart.get(key, 0.0), own.get(key, 0.0)) for key in {**apart, **own}}
+    return replace(first, source=source, uncertainty=larger)
 
 
 def _apart(a: Truth, b: Truth) -> float:
     """Return the largest difference of two methods; infinite if their ends or events differ."""
     if a.status != b.status or difference(a.events, b.events) or len(a.times) != len(b.times):
         return math.inf
-    return float(np.nan_to_num(a.errors(b.values, b.events).worst("max", "event"), nan=math.inf))
+    return float(np.nan_to_num(worst(a.errors(b.values, b.events), "max", "event"), nan=math.inf))
 
 
 def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Truth:
@@ -352,9 +336,8 @@ class WorkPoint(Cell):
 
     def error(self, kind: str, variable: str = "") -> float:
         """Return the error of a variable, else the largest; NaN if there is none."""
-        if self.errors is None:
-            return math.nan
-        return self.errors.by_kind[kind].get(variable, math.nan) if variable else self.errors.worst(kind)
+        errors = self.errors or {}
+        return errors.get((kind, variable), math.nan) if variable else worst(errors, kind)
 
 
 @dataclass(frozen=True)
@@ -374,7 +357,7 @@ class ComparedCase:
 
     def uncertainty(self, kind: str) -> float:
         """Return the uncertainty of the reference; NaN if there is none."""
-        return self.truth.uncertainty.worst(kind) if self.truth else math.nan
+        return worst(self.truth.uncertainty, kind) if self.truth else math.nan
 
 
 def precision(
@@ -496,7 +479,7 @@ def _judged(truth: Truth | None, done: Trajectory | Exception) -> WorkPoint:
     if objection:
         return WorkPoint("failed", objection)
     errors = truth.errors(computed(done), event_times(done)) if truth else None
-    if errors and not all(math.isfinite(error) for kind in errors.by_kind.values() for error in kind.values()):
+    if errors and not all(map(math.isfinite, errors.values())):
         return WorkPoint("failed", "values are not finite")
     return WorkPoint(done.status, done.reason, errors, audit(done).energy_error)
 

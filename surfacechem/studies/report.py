@@ -114,20 +114,11 @@ def mathml(latex: str, *, display: bool = False) -> str:
 
 def typeset_equation(line: Equation) -> str:
     """Convert an equation with line breaks between terms; a term wider than the page is drawn smaller."""
-    first = mathml(f"{line.left} {line.pieces[0]}", display=True)
+    found = [mathml(f"{line.left} {line.pieces[0]}", display=True)]
     # A sign at the beginning of a line is spaced like one between two terms.
-    rest = [mathml(piece, display=True).replace("<mo>", '<mo form="infix">', 1) for piece in line.pieces[1:]]
-    return " ".join(map(_fitted, [first, *rest]))
-
-
-def font_face() -> str:
-    """Return the font of formulas as a data address, so that a page needs no other file."""
-    return f"data:font/woff2;base64,{b64encode(FONT.read_bytes()).decode()}"
-
-
-def _fitted(formula: str) -> str:
-    wide = _width(ElementTree.fromstring(formula))
-    return formula.replace("<math ", f'<math style="--w:{wide:.0f}" ', 1)
+    found += [mathml(piece, display=True).replace("<mo>", '<mo form="infix">', 1) for piece in line.pieces[1:]]
+    widths = [_width(ElementTree.fromstring(formula)) for formula in found]
+    return " ".join(f.replace("<math ", f'<math style="--w:{w:.0f}" ', 1) for f, w in zip(found, widths, strict=True))
 
 
 def _width(element: Element) -> float:
@@ -219,7 +210,9 @@ class Page:
             [inline_svg(draw(), f"s{i}f{k}-") for k, draw in enumerate(section.drawings)]
             for i, section in enumerate(self.sections)
         ]
-        font = font_face() if any(section.equations for section in self.sections) else ""
+        # The font of formulas is a data address, so that the page needs no other file.
+        formulas = any(section.equations for section in self.sections)
+        font = f"data:font/woff2;base64,{b64encode(FONT.read_bytes()).decode()}" if formulas else ""
         return template.render(page=self, figures=self._figures(), drawn=drawn, machine=machine(), font=font)
 
     def write(self, target: Path) -> None:

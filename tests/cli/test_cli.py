@@ -343,7 +343,7 @@ def test_shells_complete_cases_laws_and_paths(call, monkeypatch, capsys):
         assert capsys.readouterr().out.strip() == ("initial.phi=" if "bonding" in line else "")
     monkeypatch.delenv("_SURFACECHEM_COMPLETE")
     listed = re.findall(r"^  (\w+)", call("--help").stdout.partition("Commands:")[2], re.MULTILINE)
-    assert listed[: len(commands.ORDER)] == list(commands.ORDER)
+    assert listed[:4] == ["new", "cases", "laws", "check"]
 
 
 class TestRerun:
@@ -387,10 +387,8 @@ class TestPlot:
     def test_of_a_store_leaves_that_of_a_run_of_its_name(self, call, tmp_path):
         over = ["--over", "initial.T=[300, 310]", "--set", "sweep.checked=0"]
         assert call("sweep", "bonding.yaml", "-o", "bonding.zarr", "-q", *over).exit_code == 0
-        assert [call("plot", name).stdout for name in ("bonding.yaml", "bonding.zarr")] == [
-            "bonding.png\n",
-            "bonding-sweep.png\n",
-        ]
+        told = [call("plot", name).stdout for name in ("bonding.yaml", "bonding.zarr")]
+        assert told == ["bonding.png\n", "bonding-sweep.png\n"]
         assert {name for name in files(tmp_path) if name.endswith("png")} == {"bonding.png", "bonding-sweep.png"}
 
     def test_of_a_case_ends_like_the_run(self, call, tmp_path):
@@ -416,7 +414,7 @@ class TestSweep:
         assert (drawn.exit_code, drawn.output) == (0, "")
         assert "no variable 'phy' along the runs" in call("plot", "s.nc", "--against", "phy").stderr
         assert "takes runs or sweeps, not both" in call("plot", "s.nc", "bonding.yaml").stderr
-        assert files(tmp_path) == {"s.nc", "s.png"}
+        assert files(tmp_path) == {"s.nc", "s-sweep.png"}
 
     def test_all_of_whose_runs_stop_is_stopped(self, call):
         done = call("sweep", "cooling.yaml", "--over", "initial.T=[280, 300]", "-o", "s.nc")

@@ -125,7 +125,7 @@ def test_a_computed_reference_is_as_good_as_it_says(name, variables):
     for variable in variables:
         error = relative_errors(found.values[variable][:n], exact.values[variable][:n], found.floors[variable][:n])
         # The last steps before an end that physics sets are as uncertain as its time.
-        limit = found.uncertainty.by_kind["max"][variable] + exact.uncertainty.by_kind["max"][variable]
+        limit = found.uncertainty["max", variable] + exact.uncertainty["max", variable]
         assert error.max() <= 3 * limit
         assert limit < 1e-8
 
@@ -293,7 +293,7 @@ def test_the_report_contains_everything(written):
     assert png.read_bytes().startswith(b"\x89PNG")
     words = [study.command, "<svg", "How it was measured", "Left out", "processor", "warms", *LIBRARIES]
     for case in study.axes["case"]:
-        words += [case.reference, f"uncertain  final {case.truth.uncertainty.worst('final'):.1e}"]
+        words += [case.reference, f"uncertain  final {case.uncertainty('final'):.1e}"]
         words.append(case.subject.case.text.splitlines()[0])
     words += [f"<td>{solver}</td><td>1e-08</td>" for solver in study.axes["solver"]]
     assert [word for word in words if word not in text] == []
