@@ -437,8 +437,6 @@ def parameter_path(path: str, known: Container[str]) -> str:
     """
     above, _, last = path.rpartition(".")
     others = [path, f"{path}.level", *([above] if last in VALUE_KEYS else [])]
-    if path.startswith("mechanism."):  # the path in datasets of version 0.1
-        others.append(f"interface.mechanism.reactions.{path.removeprefix('mechanism.')}")
     return next((other for other in others if other in known), path)
 
 

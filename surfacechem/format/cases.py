@@ -223,10 +223,7 @@ def load_text(
         tree, unused = _without_stale_reference(before, tree)
         text = document.dump(tree)
     # With the contents of its files in the text, a case can be read again without them.
-    whole = data_files.with_tables(tree, str(base))
-    if isinstance(tree.value, dict) and "surface" in tree.value:
-        whole = data_files.with_heights(whole, str(base))
-    whole, own = with_own_laws(whole, Path(base), allow_code)
+    whole, own = with_own_laws(data_files.with_files(tree, str(base)), Path(base), allow_code)
     if whole != tree:
         tree, text = whole, document.dump(whole)
     with laws.known(own):

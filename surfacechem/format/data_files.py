@@ -25,21 +25,28 @@ COLUMN_HEADING = re.compile(r"(?P<name>[A-Za-z]\w*)(\s*\[(?P<unit>[^\]]+)\])?")
 EXAMPLE = '"t [s], w_n [um]"'
 
 
-def with_tables(tree: Tree, base: str) -> Tree:
-    """Insert the text of every table file into the tree, so that it can be read again without the file."""
+def with_files(tree: Tree, base: str) -> Tree:
+    """Insert the text of every table file, and the numbers of every file of heights, into the tree, so that it can be
+    read again without the files.
+    """
     if isinstance(tree.value, list):
-        return replace(tree, value=[with_tables(child, base) for child in tree.value])
+        return replace(tree, value=[with_files(child, base) for child in tree.value])
     if not isinstance(tree.value, dict):
         return tree
-    values = {key: with_tables(child, base) for key, child in tree.value.items()}
-    table = values.get("table")
-    if table is not None and isinstance(table.value, dict) and "file" in table.value:
-        fields = table.mapping(KEYS)
-        if "csv" in fields:
-            raise fields["csv"].error("the table has two roles: give `file` or `csv`.")
-        path = document.named(fields.pop("file"), base, "the file of a table")
-        values["table"] = replace(table, value={"csv": Tree(document.read(path), Place(str(path))), **fields})
+    values = {key: with_files(child, base) for key, child in tree.value.items()}
+    for key, contents in (("table", _text), ("heights", _numbers)):
+        if key in values and isinstance(values[key].value, dict) and "file" in values[key].value:
+            values[key] = contents(values[key], base)
     return replace(tree, value=values)
+
+
+def _text(tree: Tree, base: str) -> Tree:
+    """Return a table with the text of its file."""
+    fields = tree.mapping(KEYS)
+    if "csv" in fields:
+        raise fields["csv"].error("the table has two roles: give `file` or `csv`.")
+    path = document.named(fields.pop("file"), base, "the file of a table")
+    return replace(tree, value={"csv": Tree(document.read(path), Place(str(path))), **fields})
 
 
 def table(tree: Tree, unit: str) -> Table | None:
@@ -146,18 +153,8 @@ Numbers = dict[str, list[float]]
 """Increasing coordinates x and y, and heights, along y for the first x, then for the next [m]."""
 
 
-def with_heights(tree: Tree, base: str) -> Tree:
-    """Insert the numbers of height files into a case; InputError, with file and place, for missing heights."""
-    if not isinstance(tree.value, dict):
-        return tree
-    read = {key: (_numbers if key == "heights" else with_heights)(child, base) for key, child in tree.value.items()}
-    return replace(tree, value=read)
-
-
 def _numbers(tree: Tree, base: str) -> Tree:
-    """Return the parameters of a law of heights, from their file if one is named."""
-    if not (isinstance(tree.value, dict) and "file" in tree.value):
-        return tree
+    """Return the parameters of a law of heights from their file; InputError, with file and place, for missing ones."""
     path = document.named(tree.mapping(("file",))["file"], base, "the file of heights")
     place = Place(str(path))
     numbers = from_netcdf(path) if path.suffix == NETCDF else from_csv(Tree(document.read(path), place))

@@ -534,7 +534,7 @@ def _scale(tree: Tree, unit: str) -> tuple[str, float, float]:
 
 def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:
     """Read a sweep; keys that are left out are taken from ``usual``."""
-    section = read(SweepSection, data_files.with_tables(tree, str(Path.cwd())), Context())
+    section = read(SweepSection, data_files.with_files(tree, str(Path.cwd())), Context())
     if usual is not None:
         for name in keys(SweepSection):
             if not section.has(name):

@@ -129,10 +129,8 @@ class Layout:
 
     def index(self, number: int) -> NDArray[np.int64]:
         """Return the numbers of the runs of a chunk, in its order."""
-        found = np.zeros(1, np.int64)
-        for part, size in zip(self.region(number), self.shape, strict=True):
-            found = (found[:, None] * size + np.arange(part.start, part.stop)).ravel()
-        return found
+        places = np.ix_(*(np.arange(part.start, part.stop) for part in self.region(number)))
+        return np.asarray(np.ravel_multi_index(places, self.shape), np.int64).ravel()
 
     def runs_of(self, numbers: Iterable[int]) -> int:
         """Return the number of runs of these chunks."""

@@ -160,7 +160,7 @@ def netcdf(folder, z, unit="um"):
 
 
 def given(folder, name):
-    tree = data_files.with_heights(
+    tree = data_files.with_files(
         parse(f"surface: {{bodies: {{flat: {{heights: {{file: {name}}}}}}}}}", "case.yaml"), folder
     )
     return tree.plain()["surface"]["bodies"]["flat"]["heights"]

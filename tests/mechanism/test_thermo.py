@@ -68,7 +68,7 @@ def test_a_sweep_compiles_once(monkeypatch):
     assert simulation.model
     made = []
     monkeypatch.setattr(Model, "__init__", lambda *_: made.append(1))
-    swept = simulation.sweep({STIFFNESS: [4e-3, 6e-3], "mechanism.R1.A": ["0.01 1/s", "0.04 1/s"]})
+    swept = simulation.sweep({STIFFNESS: [4e-3, 6e-3], "interface.mechanism.reactions.R1.A": ["0.01 1/s", "0.04 1/s"]})
     assert not made
     assert swept.dataset.sizes[STIFFNESS.rpartition(".")[2]] == 2
 

@@ -268,8 +268,8 @@ streaming.EXPLICIT_RUNS = 16
 import surfacechem
 from surfacechem.results.store import Store
 write = Store.write
-def slowly(self, *chunk):
-    write(self, *chunk)
+def slowly(self, number, *chunk):
+    write(self, number, *chunk)
     time.sleep({pause})
 Store.write = slowly
 """
