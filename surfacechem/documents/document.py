@@ -489,9 +489,7 @@ def _set_item(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
     """Set a value below an item ``name: {...}`` or a bare name of a list, which is found by its label."""
     known = labels(tree.value)
     wanted = keys[0].removesuffix("[1]")
-    if wanted not in known:
-        names = [label for label in known if label]
-        raise InputError(f"nothing is called '{keys[0]}' in {tree.place.path}.{suggestion(keys[0], names)}", place)
+    refuse_unknown([wanted], [*filter(None, known)], f"nothing is called '{{}}' in {tree.place.path}", place)
     index = known.index(wanted)
     item, changed = tree.value[index], [] if new.value in EMPTY_VALUES else [new]
     if len(keys) > 1:

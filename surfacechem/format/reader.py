@@ -15,7 +15,7 @@ from surfacechem import solve as solvers
 from surfacechem.contracts.terms import Law, Load, Property
 from surfacechem.contracts.units import TOTAL_UNITS
 from surfacechem.documents.document import Tree
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.format.declarations import UNITS, Context, is_name, keys, number, read
 from surfacechem.format.sections import (
     BODY_NAME,
@@ -308,9 +308,9 @@ def _sites(case: Document) -> Sites | None:
         if name not in sites:
             raise section.error(f"the sites of {name} are missing: give both bodies a density.", "sites")
     reference = sites.get("reference", bodies[0])
-    if reference not in bodies:
+    if "reference" in sites:
         place = section.tree.value["sites"].value["reference"].place
-        raise InputError(f"no body '{reference}'.{suggestion(reference, bodies)}", place)
+        refuse_unknown([reference], bodies, "no body '{}'", place)
     return Sites(sites[bodies[0]], sites[bodies[1]], bodies.index(reference) + 1)
 
 

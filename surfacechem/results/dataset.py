@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
 from surfacechem.results.netcdf import (
@@ -180,8 +180,7 @@ class Results(ABC):
 
     def __getitem__(self, name: str) -> xarray.DataArray:
         """Return a variable of the dataset by name; InputError if it has none of that name."""
-        if name not in self.dataset:
-            raise InputError(f"no variable '{name}'.{suggestion(name, map(str, self.dataset))}")
+        refuse_unknown([name], list(map(str, self.dataset.variables)), "no variable '{}'")
         return self.dataset[name]
 
     def plot(self, variables: Sequence[str] | None = None, against: str | None = None, celsius: bool = False) -> Figure:

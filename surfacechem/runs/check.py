@@ -29,9 +29,9 @@ from surfacechem.model.system import Conductor, System
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT, VARIABLES
 from surfacechem.results.audit import active_cautions
 from surfacechem.scene import Scene
+from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Array, Problem
 from surfacechem.solve.diagnose import time_scales
-from surfacechem.solve.radau.solver import consistent
 from surfacechem.solve.run import Model
 from surfacechem.tolerances import CONSERVED_RATE, FEW_EPS, NO_AMOUNT, TINY
 
@@ -57,7 +57,6 @@ class Start:
     """The linearised equations M dy' + K dy = 0 at a consistent initial state."""
 
     y: Array
-    ydot: Array
     M: Array
     K: Array
     outputs: Mapping[str, float]
@@ -67,21 +66,14 @@ class Start:
 
 def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
     """Solve for rates and algebraic variables at the start; None if that breaks down."""
-    system, program = model.system, model.program
+    system = model.system
     parameters = np.array([p.at(0.0) if p.load else values[p.path] for p in system.parameters])
-    y = system.initial_state(values)
-    ydot = np.zeros_like(y)
-    if program.rates is None:
-        found = consistent(program, 0.0, y, ydot, parameters)
-        y, ydot = (found.y, found.ydot) if found.valid else (y, np.full_like(y, np.nan))
-    else:  # no search, for which the stepper would have to be compiled
-        ydot = program.rates(program.filled(np.concatenate([[0.0], y, ydot, parameters])))
-    if not np.all(np.isfinite(ydot)):
+    at = Evaluation(model.program, system.initial_state(values), parameters)
+    if not at.put(0.0, at.y[at.free].copy()) or not np.all(np.isfinite(at.ydot)):
         return None
-    inputs = program.filled(np.concatenate([[0.0], y, ydot, parameters]))
-    K, M = program.derivatives(inputs)
-    outputs = dict(zip((item.name for item in system.outputs), model.output_function(inputs).tolist(), strict=True))
-    return Start(y, ydot, M, K, outputs, inputs)
+    K, M = model.program.derivatives(at.inputs)
+    outputs = dict(zip((item.name for item in system.outputs), model.output_function(at.inputs).tolist(), strict=True))
+    return Start(at.y, M, K, outputs, at.inputs)
 
 
 def rates(start: Start) -> NDArray[np.complex128]:

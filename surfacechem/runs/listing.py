@@ -13,7 +13,7 @@ from dataclasses import MISSING, dataclass, field, fields
 
 from surfacechem.contracts.terms import Law
 from surfacechem.documents import cases
-from surfacechem.errors import LAWS, InputError, suggestion
+from surfacechem.errors import LAWS, refuse_unknown
 from surfacechem.laws import FAMILIES, laws
 
 Rows = Sequence[Sequence[str]]
@@ -183,8 +183,7 @@ def law_page(name: str) -> str:
         return law_table(asked[0])
     every = [(contract, law) for contract in FAMILIES for law in laws(contract).values()]
     found = [(contract, law) for contract, law in every if law.name() == name]
-    if not found:
-        raise InputError(f"no law '{name}'.{suggestion(name, {law.name() for _, law in every}, LAWS)}")
+    refuse_unknown([name], {law.name() for _, law in every}, "no law '{}'", listed_by=LAWS)
 
     def apart(formula: re.Match[str]) -> str:
         """Indent formulas, each on its own line if they are too long for one."""
@@ -210,6 +209,5 @@ def case_table() -> Sheet:
 def case_text(name: str) -> str:
     """Return the text of a shipped case; InputError with the nearest name if there is none."""
     known = {path.stem: path for path in cases().glob("*.yaml")}
-    if name not in known:
-        raise InputError(f"no case '{name}' comes with the package.{suggestion(name, known)}")
+    refuse_unknown([name], known, "no case '{}' comes with the package")
     return known[name].read_text(encoding="utf-8")

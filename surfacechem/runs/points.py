@@ -22,7 +22,7 @@ from surfacechem.contracts.terms import Load
 from surfacechem.contracts.units import parse, quotient
 from surfacechem.documents import document
 from surfacechem.documents.document import Tree
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.format.data_files import CSVText
 from surfacechem.laws.loading import Hold
@@ -195,9 +195,7 @@ class Evaluator:
     def _given(self, points: Points) -> tuple[list[Argument], Array]:
         """Return the arguments that the points give, and their values, shape (points, arguments)."""
         known = self.names | self.parameters
-        for name in points:
-            if name not in known:
-                raise InputError(f"points cannot give '{name}'.{suggestion(name, known)}")
+        refuse_unknown(points, known, "points cannot give '{}'")
         given = {name: _numbers(name, value, known[name].quantity.unit) for name, value in points.items()}
         for end in (np.min, np.max):  # the ranges are the same as in a run
             values_of(self.system, {name: end(x) for name, x in given.items() if name in self.parameters})
@@ -442,11 +440,10 @@ def read_points(path: Path, evaluator: Evaluator) -> dict[str, list[float]]:
     if not path.is_file():
         raise InputError("there is no such file of points.", Place(str(path)))
     text = CSVText(Tree(document.read(path, str(path)), Place(str(path))), quoted=True)
-    for name, _ in text.columns:
-        if name not in evaluator.names:
-            raise text.error(text.heading[0], f"points cannot give '{name}'.{suggestion(name, evaluator.names)}")
+    nothing = text.error(text.heading[0], "there is no row of values below these names.")
+    refuse_unknown([name for name, _ in text.columns], evaluator.names, "points cannot give '{}'", nothing.place)
     if not text.rows:
-        raise text.error(text.heading[0], "there is no row of values below these names.")
+        raise nothing
     return {name: text.column(name, evaluator.names[name].quantity.unit, name) for name, _ in text.columns}
 
 

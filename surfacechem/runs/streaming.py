@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surfacechem import format as cases
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.format.plans import Plan, recorded_plan
 from surfacechem.format.sections import ALL, SweepSection
 from surfacechem.results.dataset import quantities
@@ -293,8 +293,7 @@ class Stream:
 
 def failed_runs(path: Path, status: str) -> Plan:
     """Return the plan of the runs of a store with this status; InputError if it has none, or is no store of a sweep."""
-    if status not in STATUSES:
-        raise InputError(f"no runs are called '{status}'.{suggestion(status, STATUSES)}", Place(path="--only"))
+    refuse_unknown([status], STATUSES, "no runs are called '{}'", Place(path="--only"))
     data = opened(path)
     if "sweep" not in data.attrs:
         raise InputError("is no store of a sweep.", Place(str(path)))

@@ -20,7 +20,7 @@ from surfacechem import documents
 from surfacechem.contracts.units import parse as si
 from surfacechem.documents import document
 from surfacechem.documents.document import Tree
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, refuse_unknown
 from surfacechem.format.data_files import CSVText
 from surfacechem.format.declarations import (
     REQUIRED,
@@ -230,7 +230,7 @@ def read_list(name: str) -> ListSection:
     path = Path(name) if Path(name).suffix else lists() / f"{name}.yaml"
     if not document.is_file(path):
         known = [path.stem for path in lists().glob("*.yaml")]
-        raise InputError(f"no list of figures '{name}'.{suggestion(name, known)}", Place(path="LIST"))
+        refuse_unknown([name], known, "no list of figures '{}'", Place(path="LIST"))
     return read(ListSection, document.parse(document.read(path), str(path)), Context())
 
 
@@ -289,9 +289,9 @@ def _computed(section: CurveSection, folder: Path, exact: str) -> tuple[xarray.D
 
 def _values(dataset: xarray.Dataset, axis: AxisSection) -> Array:
     """Return a variable of a run over time, or its values at the ends of the runs of a sweep."""
-    if (name := axis.variable) not in dataset.variables:
-        raise axis.error(f"no variable '{name}'.{suggestion(name, list(map(str, dataset.variables)))}", "variable")
-    values = dataset[name]
+    place = axis.tree.value["variable"].place
+    refuse_unknown([axis.variable], list(map(str, dataset.variables)), "no variable '{}'", place)
+    values = dataset[axis.variable]
     return np.asarray(values.values if values.ndim == 1 else values.isel(time=-1).values, dtype=float)
 
 
