@@ -131,14 +131,9 @@ class CSVText:
         if names.count(name) > 1:
             raise self.error(self.heading[0], f"the column {name} is there {names.count(name)} times.")
         if name not in names:
-            others = [other for other in names if other != "t"]
-            other = others[0] if len(others) == 1 else "NAME"
-            # A column of another name is never chosen automatically.
-            remedy = (
-                f" To take one of another name, write `column: {other}`."
-                if self.renamed and others and name != "t"
-                else ""
-            )
+            others, remedy = [other for other in names if other != "t"], ""
+            if self.renamed and others and name != "t":  # a column of another name is never chosen automatically
+                remedy = f" To take one of another name, write `column: {others[0] if len(others) == 1 else 'NAME'}`."
             raise self.error(self.heading[0], f"no column '{name}'.{suggestion(name, names)}{remedy}")
         return names.index(name)
 
