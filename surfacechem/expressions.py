@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache, reduce
 from typing import Any, TypeAlias
 
-from surfacechem.tolerances import FORMULA_EPS, FRACTION_FLOOR
+from surfacechem.tolerances import FORMULA_EPS, FRACTION_FLOOR, GUARD_EPS
 
 Expression: TypeAlias = Any
 """A float or a SymEngine expression."""
@@ -141,6 +141,17 @@ def _partial(whole: Any, k: int) -> Expression:
         return symengine.Mul(*arguments[:k], *arguments[k + 1 :])
     dummies = [symengine.Symbol(f"argument {j}") if j == k else arguments[j] for j in range(len(arguments))]
     return symengine.diff(whole.func(*dummies), dummies[k]).xreplace({dummies[k]: arguments[k]})
+
+
+def certain(expression: Expression) -> Expression:
+    """Return an expression that is positive only where the given one is, whatever its roundoff.
+
+    >>> import symengine
+    >>> x = symengine.Symbol("x")
+    >>> [float(certain(x - 1).subs({x: 1 + above})) > 0 for above in (1e-14, 1e-12)]
+    [False, True]
+    """
+    return expression - GUARD_EPS * magnitude(expression)
 
 
 def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = None) -> Expression:

@@ -24,14 +24,14 @@ import symengine
 from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import TOTAL_UNITS
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.expressions import Expression, depends, magnitude
+from surfacechem.expressions import Expression, certain, depends
 from surfacechem.model import components, constraints, ledger
 from surfacechem.model.build import Build
 from surfacechem.model.components.sliding_friction import stands_for_velocity
 from surfacechem.model.system import START, Array, ExternalRates, System
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Scene
-from surfacechem.tolerances import CBRT_EPS, EPS, GUARD_EPS
+from surfacechem.tolerances import CBRT_EPS, EPS
 
 AREAL_PATH = "surface"
 """Start of the paths of parameters that are per area in every scene."""
@@ -344,12 +344,12 @@ def _value_of(expression: Expression, places: Mapping[Any, int]) -> Callable[[Se
         return lambda numbers: math.fsum([factor * numbers[place] for place, factor in terms])
     symbols = expression.free_symbols
     known = {x: places[x] for x in symbols if x in places}
-    certain = cache(lambda: symengine.Lambdify([*known], [expression - GUARD_EPS * magnitude(expression)]))
+    bound = cache(lambda: symengine.Lambdify([*known], [certain(expression)]))
 
     @lru_cache(maxsize=64)  # runs that differ in other numbers, as a run and its second one, start from the same
     def value(*own: float) -> float | None:
         # Exact arithmetic takes longer than a brief run: of many starts the first, and those near a limit, need it.
-        if value.cache_info().currsize and len(known) == len(symbols) and (least := float(certain()(own)[0])) > 0:
+        if value.cache_info().currsize and len(known) == len(symbols) and (least := float(bound()(own)[0])) > 0:
             return least
         found = expression.subs(dict(zip(known, map(_exact, own), strict=True)))
         return None if found.free_symbols else float(found)

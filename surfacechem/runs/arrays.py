@@ -15,7 +15,7 @@ import numpy as np
 
 from surfacechem.compile.program import Function, compile_function
 from surfacechem.errors import InputError
-from surfacechem.expressions import derivative, magnitude
+from surfacechem.expressions import certain, derivative
 from surfacechem.format.plans import Plan
 from surfacechem.model.system import System
 from surfacechem.results.audit import LAST_DIGITS, residuals, resolved
@@ -183,8 +183,7 @@ class ArrayRuns:
         system = self.model.system
         rates = {state.dot for state in system.states}
         found = [expression for _, expression in system.limits if not expression.free_symbols & rates]
-        certain = [expression - GUARD_EPS * magnitude(expression) for expression in found]
-        return compile_function(system.inputs, certain, steps=True) if found else None
+        return compile_function(system.inputs, [*map(certain, found)], steps=True) if found else None
 
     @cached_property
     def ramp(self) -> Function | None:

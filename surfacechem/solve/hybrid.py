@@ -111,9 +111,7 @@ class Arc:
     end: float
     """Time reached [s]."""
     status: Status
-    times: Array
-    """Output times reached [s]."""
-    ledger_start: Array
+    ledger: Array
     """Ledger at its start."""
 
 
@@ -124,6 +122,8 @@ class Hybrid:
         self.system, self.jumper, self.problem = system, jumper, problem
         self.instant = Instant(system, jumper, problem, first)
         self.arcs: list[Arc] = []
+        self.outputs: list[States] = []
+        """Outputs in the time and ledger of the run, with the arcs as segments."""
         self.exchanged = np.zeros(problem.program.n_ledger)
         self.extremes = np.array([problem.y0, problem.y0])
         self.deadline = None if problem.max_seconds is None else time.monotonic() + problem.max_seconds
@@ -156,9 +156,7 @@ class Hybrid:
         reached = self.arcs[-1].end if self.arcs else float(problem.segments[0])
         # A jump may lie beyond the last arc, at the time of a fold.
         t = max(reached, instant.jumps[-1].t) if instant.reason and instant.jumps else reached
-        if not self.arcs:
-            return ended_at_start(problem, instant.status, t, instant.ledger)
-        return merged(problem, self.arcs, instant.status, t, instant.ledger)
+        return self._joined(t) if self.arcs else ended_at_start(problem, instant.status, t, instant.ledger)
 
     def _next_start(self, arc: Arc, end: float) -> Point | None:
         """Return the point from which a run goes on after an arc; None if the run ends with it."""
@@ -190,14 +188,13 @@ class Hybrid:
         """
         times = self.problem.times[self._outputs_written :]
         times = times[times <= reached.t] if reached.t >= end else times[times < reached.t]
-        if len(times):
-            arc, count = self.arcs[-1], (len(times), 1)
-            outputs = np.concatenate([arc.result.outputs, np.tile(reached.y, count)])
-            ledger = np.concatenate([arc.result.ledger_outputs, np.tile(arc.result.ledger, count)])
-            shown = np.append(arc.result.times, times - arc.start.t)
-            result = arc.result._replace(times=shown, outputs=outputs, ledger_outputs=ledger)
-            self.arcs[-1] = replace(arc, result=result, times=np.append(arc.times, times))
-            self._outputs_written += len(times)
+        count = len(times), 1
+        self._write(times, np.tile(reached.y, count), np.tile(self.instant.ledger, count))
+
+    def _write(self, times: Array, y: Array, ledger: Array) -> None:
+        """Add outputs of the last arc."""
+        self.outputs.append(States(times, y, ledger, np.full(len(times), len(self.arcs) - 1)))
+        self._outputs_written += len(times)
 
     def _beyond(self, arc: Arc, point: Point) -> Point | None:
         """Return the point from which a run may go on after a solver has failed; None if there is none."""
@@ -261,13 +258,13 @@ class Hybrid:
         if status is Status.FINISHED or (status in LOST_STATUSES and end - reached <= SAME_MOMENT * end):
             # Where a gap closes at the very end, the remaining time is roundoff.
             reached, status = end, Status.FINISHED
-        arc = Arc(result, start, reached, status, times[: len(result.times)], instant.ledger)
+        arc = Arc(result, start, reached, status, instant.ledger)
         self.arcs.append(arc)
+        self._write(times[: len(result.times)], result.outputs, instant.ledger + result.ledger_outputs)
         instant.ledger = instant.ledger + result.ledger
         instant.last_flow = (start.t, result.t, reached)
         self.exchanged = np.maximum(self.exchanged, np.abs(instant.ledger))
         self._steps += result.counters.steps
-        self._outputs_written += len(result.times)
         seen = np.vstack((start.y, result.y, *(() if result.steps is None else (result.steps.y,))))
         least, largest = self.extremes
         self.extremes = np.array([np.minimum(least, seen.min(axis=0)), np.maximum(largest, seen.max(axis=0))])
@@ -276,6 +273,68 @@ class Hybrid:
             instant.status, instant.reason = Status.FAILED, MISSED_CLOSING
             return None
         return arc
+
+    def _joined(self, end: float) -> Result:
+        """Join the arcs to one result that ends at this time."""
+        arcs, instant, problem, last = self.arcs, self.instant, self.problem, self.arcs[-1].result
+        segments = np.array([*(arc.start.t for arc in arcs), problem.segments[-1]])
+        problem = replace(problem, segments=segments, parameters=np.array([arc.start.parameters for arc in arcs]))
+        outputs = States(*map(np.concatenate, zip(*self.outputs, strict=True)))
+        *events, _ = _points(arcs, [arc.result.events for arc in arcs])
+        steps = known = None
+        if problem.record_steps:
+            t, y, ydot, ledger, number = _points(arcs, [arc.result.steps for arc in arcs])
+            # The start of an arc, and a step too short to change the time, repeat the event that ended the last arc.
+            kept = (t > segments[number]) | (number == 0)
+            steps = Points(t[kept], y[kept], ydot[kept], ledger[kept], segment=number[kept])
+            if problem.line_error:
+                inside = [
+                    States(arc.start.t + rows.t, rows.y, arc.ledger + rows.ledger, np.full(len(rows.t), k))
+                    for k, arc in enumerate(arcs)
+                    if (rows := arc.result.inside) is not None
+                ]
+                parts = outputs, States(t, y, ledger, number), *inside
+                known = known_states(parts, np.array([arc.end for arc in arcs]))
+        return Result(
+            problem=problem,
+            status=instant.status,
+            t=end,
+            y=last.y,
+            ydot=last.ydot,
+            ledger=instant.ledger,
+            margins=last.margins,
+            times=outputs.t,
+            outputs=outputs.y,
+            ledger_outputs=outputs.ledger,
+            events=Events(*events, index=np.concatenate([arc.result.events.index for arc in arcs])),
+            counters=Counters(*map(sum, zip(*(arc.result.counters for arc in arcs), strict=True))),
+            steps=steps,
+            stepping=sum((arc.result.stepping for arc in arcs), 0.0),
+            segment=outputs.segment,
+            known=known,
+        )
+
+
+def _points(arcs: Sequence[Arc], parts: Sequence[Points | None]) -> tuple[Array, Array, Array, Array, Index]:
+    """Return times, states, rates and ledgers of points of the arcs, in the time and ledger of the run, and the number
+    of the arc of each.
+    """
+    rows = [
+        (arc.start.t + part.t, part.y, part.ydot, arc.ledger + part.ledger, np.full(len(part.t), k))
+        for k, (arc, part) in enumerate(zip(arcs, parts, strict=True))
+        if part is not None
+    ]
+    t, y, ydot, ledger, number = map(np.concatenate, zip(*rows, strict=True))
+    return t, y, ydot, ledger, number
+
+
+def known_states(parts: Sequence[States], ends: Array) -> States:
+    """Return all states of arcs that end at these times, in order of time, of those at one moment of an arc the first:
+    outputs, at exactly the requested times, come before others.
+    """
+    t, y, ledger, segment = map(np.concatenate, zip(*parts, strict=True))
+    kept = in_order(t, segment)
+    return States(np.minimum(t[kept], ends[segment[kept]]), y[kept], ledger[kept], segment[kept])
 
 
 def carried(problem: Problem, jumper: Jumper) -> Flow[tuple[Result, list[Jump], str] | None]:
@@ -314,11 +373,8 @@ def with_arc_segments(problem: Problem, result: Result) -> Result:
         steps = replace(steps, segment=segments(2, len(steps.t)))
     if inside is not None and steps is not None:
         inside = inside._replace(segment=segments(4, len(inside.t)))
-        parts: tuple[tuple[Any, ...], ...] = outputs, (steps.t, steps.y, steps.ledger, steps.segment), inside
-        t, y, ledger, segment = map(np.concatenate, zip(*parts, strict=True))
-        kept = in_order(t, segment)
-        ends = np.append(arcs[1:, 0], result.t)[segment[kept]]
-        known = States(np.minimum(t[kept], ends), y[kept], ledger[kept], segment[kept])
+        parts = outputs, States(steps.t, steps.y, steps.ledger, steps.segment), inside
+        known = known_states(parts, np.append(arcs[1:, 0], result.t))
     return result._replace(problem=problem, segment=outputs.segment, steps=steps, inside=None, known=known)
 
 
@@ -345,66 +401,3 @@ def with_start(problem: Problem, result: Result) -> Result:
     ledger = np.zeros((1, problem.program.n_ledger))
     shown = result._replace(problem=problem, times=at, outputs=start.y[None], ledger_outputs=ledger)
     return shown._replace(segment=None, inside=None, known=None)
-
-
-def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, ledger: Array) -> Result:
-    """Join arcs to one result that ends at this time with this ledger."""
-    results = [arc.result for arc in arcs]
-    last = results[-1]
-    segments = np.array([*(arc.start.t for arc in arcs), problem.segments[-1]])
-    problem = replace(problem, segments=segments, parameters=np.array([arc.start.parameters for arc in arcs]))
-    *events, _ = _points(arcs, [result.events for result in results])
-    steps = None
-    if problem.record_steps:
-        t, y, ydot, rows, number = _points(arcs, [result.steps for result in results])
-        # The start of an arc, and a step too short to change the time, repeat the event that ended the last arc.
-        kept = (t > segments[number]) | (number == 0)
-        steps = Points(t[kept], y[kept], ydot[kept], rows[kept], segment=number[kept])
-    return Result(
-        problem=problem,
-        status=status,
-        t=end,
-        y=last.y,
-        ydot=last.ydot,
-        ledger=ledger,
-        margins=last.margins,
-        times=np.concatenate([arc.times for arc in arcs]),
-        outputs=np.concatenate([result.outputs for result in results]),
-        ledger_outputs=np.concatenate([arc.ledger_start + arc.result.ledger_outputs for arc in arcs]),
-        events=Events(*events, index=np.concatenate([result.events.index for result in results])),
-        counters=Counters(*map(sum, zip(*(result.counters for result in results), strict=True))),
-        steps=steps,
-        stepping=sum((result.stepping for result in results), 0.0),
-        segment=np.repeat(np.arange(len(arcs)), [len(arc.times) for arc in arcs]),
-        known=_known(arcs),
-    )
-
-
-def _known(arcs: Sequence[Arc]) -> States | None:
-    """Return all stored states of the arcs, in the run's time and ledger; None if interpolation needs none."""
-    if not arcs[0].result.problem.line_error:
-        return None
-    found = [arc.result.scattered()[:3] for arc in arcs]
-    # Outputs come first, at exactly the requested times.
-    t = np.concatenate(
-        [np.append(arc.times, arc.start.t + rows[0][len(arc.times) :]) for arc, rows in zip(arcs, found, strict=True)]
-    )
-    y, ledger = (np.concatenate([rows[k] for rows in found]) for k in (1, 2))
-    number = np.repeat(np.arange(len(arcs)), [len(rows[0]) for rows in found])
-    end, ledger_start = np.array([arc.end for arc in arcs]), np.array([arc.ledger_start for arc in arcs])
-    kept = in_order(t, number)
-    number = number[kept]
-    return States(np.minimum(t[kept], end[number]), y[kept], ledger_start[number] + ledger[kept], number)
-
-
-def _points(arcs: Sequence[Arc], parts: Sequence[Points | None]) -> tuple[Array, Array, Array, Array, Index]:
-    """Return times, states, rates and ledgers of points of the arcs, in the time and ledger of the run, and the number
-    of the arc of each.
-    """
-    rows = [
-        (arc.start.t + part.t, part.y, part.ydot, arc.ledger_start + part.ledger, np.full(len(part.t), k))
-        for k, (arc, part) in enumerate(zip(arcs, parts, strict=True))
-        if part is not None
-    ]
-    t, y, ydot, ledger, number = map(np.concatenate, zip(*rows, strict=True))
-    return t, y, ydot, ledger, number
