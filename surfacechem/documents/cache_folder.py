@@ -66,13 +66,11 @@ def make_folder(folder: Path) -> None:
 
 
 def keep_file(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all, even if the machine stops meanwhile."""
+    """Write a file whole or not at all; what a machine that stops meanwhile leaves of it has another SHA-256."""
     handle, name = tempfile.mkstemp(dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
-            file.flush()
-            os.fsync(handle)
         Path(name).chmod(0o644)
         Path(name).replace(path)
     except BaseException:
@@ -200,9 +198,8 @@ def from_file(
     with suppress(OSError):
         make_folder(folder)
         keep_file(path, sealed(content))
-        with os.scandir(folder) as entries:
-            files = [entry.path for entry in entries]
-        # If there are too many files the older half is removed.
-        for old in sorted(files, key=os.path.getmtime)[: len(files) // 2] if len(files) > MOST_FILES else ():
-            Path(old).unlink(missing_ok=True)
+        names = os.listdir(folder)
+        if len(names) > MOST_FILES:  # the older half is removed
+            for old in sorted((folder / name for name in names), key=os.path.getmtime)[: len(names) // 2]:
+                old.unlink(missing_ok=True)
     return found

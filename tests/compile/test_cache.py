@@ -44,7 +44,7 @@ compiled(x)
 assert x[0] == 42.0
 print("hits", sum(compiled.stats.cache_hits.values()), "filled", is_filled(folder))
 """
-STEPS = ["tempfile.mkstemp", "os.fsync", "os.replace"]
+STEPS = ["tempfile.mkstemp", "os.replace"]
 BY_STEPS = f"""
 import os, tempfile
 from numba.core import dispatcher
