@@ -20,8 +20,9 @@ run: $(RUNTIME)  ## the main case: its error, its run time, its plot
 	$(BIN)/surfacechem run exothermic -o results/exothermic.nc
 	$(BIN)/surfacechem plot results/exothermic.nc -o results/exothermic.png
 
+# The documentation comes after `lint`, and finds the code of cases that the tests beside have made by then.
 test:  ## everything, side by side; the tests run every case, and the wheel by itself
-	$(MAKE) --jobs=3 --output-sync=target lint unit docs
+	$(MAKE) --jobs=2 --output-sync=target lint unit docs
 
 lint: $(TOOLS)  ## style, types and which room imports which
 	$(BIN)/ruff check

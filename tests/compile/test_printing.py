@@ -24,7 +24,7 @@ pytestmark = pytest.mark.around
 APPROVED = Path(__file__).parents[1] / "approved"
 
 
-def random_states(system, count=20):
+def random_states(system, count=5):
     random = np.random.default_rng(7)
     for _ in range(count):
         scale = np.array([state.scale for state in system.states])

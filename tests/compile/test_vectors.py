@@ -95,7 +95,7 @@ LARGE = ("closing-gas-gap", "elastic-bonds-at-a-gap")
 OF_CASES = sorted((m for m in zoo.MEMBERS.values() if "case" in m.tags), key=lambda member: member.name in LARGE)
 
 
-@pytest.mark.parametrize("member", every(4, OF_CASES), ids=lambda member: member.name)
+@pytest.mark.parametrize("member", every(8, OF_CASES), ids=lambda member: member.name)
 def test_rates_and_guards_of_a_case_are_those_of_its_scalar_code(member):
     model = case_runs.load(member.name).model
     program = model.program

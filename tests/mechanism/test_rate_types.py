@@ -117,8 +117,9 @@ def test_a_mechanism_says_what_a_case_says(tmp_path, equation, kind, more, law, 
         assert call(lowered.log_forward, point) == pytest.approx(math.log(abs(expected)), rel=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["linear-affinity", "exponential-affinity"])
-@pytest.mark.parametrize("stiffness", [None, {"stiffness": "1 pN/nm"}])
+@pytest.mark.parametrize(
+    ("kind", "stiffness"), [("linear-affinity", None), ("exponential-affinity", {"stiffness": "1 pN/nm"})]
+)
 def test_affinity_laws_run_as_in_a_case(tmp_path, kind, stiffness):
     read = mechanism(tmp_path, [reaction("free <=> bond", kind, {})], stiffness)
     T, g = 300.0, 3e-9

@@ -6,6 +6,7 @@ import random
 import numpy as np
 import pytest
 from law_values import USUAL
+from sampling import every
 from solved import solve
 
 from surfacechem.contracts.terms import BodyEnergy, Friction, HeatTransfer, Potential, RateLaw, Varying, reads
@@ -84,7 +85,7 @@ def same(make, names, times=(0.0, 0.1, 0.4, 1.0), extensive=("U_c", "S_c", "U_1"
 # -- every law --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", laws(Potential))
+@pytest.mark.parametrize("name", every(3, laws(Potential)))
 def test_every_potential(name):
     law = laws(Potential)[name]
     moves = {"g_n": Ramp(start=4e-10, rate=1e-9), "g_t": Ramp(start=1e-10, rate=1e-9), "phi": Ramp(start=0.2, rate=0.3)}
@@ -99,7 +100,7 @@ ALONE = {"compliant-debonding"}
 """Laws that need a potential and a mounting of their own; see below."""
 
 
-@pytest.mark.parametrize("name", [name for name in laws(RateLaw) if name not in ALONE])
+@pytest.mark.parametrize("name", every(4, [name for name in laws(RateLaw) if name not in ALONE]))
 def test_every_rate_law(name):
     law = laws(RateLaw)[name]
     read = reads(law.rate)
@@ -116,7 +117,7 @@ def test_every_rate_law(name):
     assert abs(stretched["phi"][-1] - 0.3) > 1e-6
 
 
-@pytest.mark.parametrize("name", laws(Friction))
+@pytest.mark.parametrize("name", every(3, laws(Friction)))
 def test_every_friction_law(name):
     law = laws(Friction)[name]
     loading = {"p": Hold(level=1e5), "v": Hold(level=2e-3), "g_n": Hold(level=1e-6)}
@@ -130,7 +131,7 @@ def test_every_friction_law(name):
     )
 
 
-@pytest.mark.parametrize("name", laws(HeatTransfer))
+@pytest.mark.parametrize("name", every(3, laws(HeatTransfer)))
 def test_every_heat_path_between_the_bodies(name):
     law = laws(HeatTransfer)[name]
     read = {variable for formula in sample(law, 1.0).channels().values() for variable in reads(formula)}

@@ -118,7 +118,7 @@ def test_fewer_partners_than_sites_bound_what_does_not_read_them():
 MIXING = (LatticeGas, SITES, 1.0), (partial(PartnerMixing, a=1e-16), Sites(1e16, 5e15), 0.5)
 
 
-@pytest.mark.parametrize(("epsilon", "mixed", "solver"), pairwise([2e-19, 6e-19, 1e-18], MIXING, ["radau", "lsoda"]))
+@pytest.mark.parametrize(("epsilon", "mixed", "solver"), pairwise([2e-19, 1e-18], MIXING, ["radau", "lsoda"]))
 def test_bonds_too_strong_for_an_equilibrium_below_the_bound_are_complete(epsilon, mixed, solver):
     """Fifty k_B T and more: what is left unbonded is less than the last digit of the bonding state."""
     mixing, sites, bound = mixed

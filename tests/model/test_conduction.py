@@ -64,9 +64,9 @@ def errors(simulation: Simulation) -> np.ndarray:
 @pytest.mark.parametrize(("far", "grading", "perfect"), [("convective", 10, False), ("insulated", 1, True)])
 def test_second_order_in_space(far, grading, perfect):
     """Of a held far side the table of the documentation says so, below."""
-    coarse, fine = (errors(two(cells, far, grading, perfect)) for cells in (20, 40))
+    coarse, fine = (errors(two(cells, far, grading, perfect)) for cells in (16, 32))
     assert np.all(np.log2(coarse / fine) > 1.9)
-    assert np.all(fine < 4 * 0.03)
+    assert np.all(fine < 6 * 0.03)
 
 
 def test_the_table_of_the_documentation():
@@ -83,14 +83,14 @@ def test_the_table_of_the_documentation():
 @pytest.mark.parametrize("bulk", ["constant", "quadratic"])
 def test_two_temperatures_in_contact_become_the_one_that_keeps_their_energy(bulk):
     """With energies that are quadratic in temperature that is a mean of squares."""
-    start = float(two(4, perfect=True, capacity=bulk, exact=False).run().dataset["T"][0])
+    start = float(two(4, perfect=True, capacity=bulk, exact=False).run(error="balances").dataset["T"][0])
     power = 1 if bulk == "constant" else 2
     assert start == pytest.approx(((4 * 400**power + 9 * 300**power) / 13) ** (1 / power), rel=1e-13)
 
 
 @pytest.mark.parametrize(("far", "perfect"), list(zip(FAR, (True, False, True), strict=True)))
 def test_both_laws_are_kept_by_the_cells(far, perfect):
-    run = two(10, far, perfect=perfect).run()
+    run = two(10, far, perfect=perfect).run(error="balances")
     assert run.audit.energy_error < 1e-11
     assert run.audit.entropy_error < 1e-9
     assert run.audit.violations == ()
@@ -101,13 +101,13 @@ def test_both_laws_are_kept_by_the_cells(far, perfect):
 
 def test_chains_are_solved_as_the_whole_matrix_is():
     simulation = two(20, "convective", grading=5)
-    ours = simulation.run().trajectory.result
+    ours = simulation.run(error="balances").trajectory.result
     other = simulation.model.solve(replace(simulation.case.run, solver="ida", rtol=1e-9)).result
     np.testing.assert_allclose(other.outputs, ours.outputs, rtol=2e-7)
 
 
 def test_huge_conductances_lose_nothing():
-    run, perfect = two(20, h="1e20", exact=False).run(), two(20, perfect=True).run()
+    run, perfect = (two(10, **given).run(error="balances") for given in ({"h": "1e20"}, {"perfect": True}))
     np.testing.assert_allclose(run.dataset.profile_1[1:], perfect.dataset.profile_1[1:], rtol=1e-8)
     assert run.audit.energy_error < 1e-11
 
@@ -126,14 +126,15 @@ T_0: 300 K
 initial: {{profile_1: 350 K}}
 run: {{until: 1 hour}}
 """
-    run = Simulation(load_text(text)).run()
+    run = Simulation(load_text(text)).run(error="balances")
     assert run.dataset.Q_T_far_1[-1] == pytest.approx(-0.2 * 1.2 * 100 / 2e-3, rel=1e-9)
     assert run.audit.violations == ()
 
 
 def test_a_joint_jump_heats_the_volume_of_the_bodies():
     conduction = "{thickness: 1 mm, conductivity: 0.5 W/m/K, cells: 4}"
-    run = surfacechem.run("debonding", [f"bodies.{body}.conduction={conduction}" for body in ("lower", "upper")])
+    changes = [f"bodies.{body}.conduction={conduction}" for body in ("lower", "upper")]
+    run = surfacechem.load("debonding", [*changes, "run={until: 10 s}"]).run(error="balances")
     assert run.trajectory.jumps[0].verdict == "admissible"
     assert run.audit.energy_error < 1e-12
     lumped = solved("debonding").dataset["T"].values[-1]
@@ -149,7 +150,7 @@ def test_a_search_that_ends_early_states_the_error_of_its_last_cells(monkeypatch
 
 
 def test_a_sweep_takes_the_cells_that_its_runs_need_and_states_what_they_leave():
-    conductivities = np.array([20.0, 2.0, 0.2, 0.02])
+    conductivities = np.array([20.0, 0.02])
     stated = {}
     for cells in ("{accuracy: 1e-4}", "24"):
         simulation = one(cells, "until: 0.2 s, outputs: 11", h=2e3, hot=400.0)
@@ -171,7 +172,7 @@ def test_an_accuracy_out_of_reach_is_said(monkeypatch: pytest.MonkeyPatch):
 def test_profiles_have_their_places_in_the_file(tmp_path):
     import xarray
 
-    run = two(10, "held", grading=4).run()
+    run = two(10, "held", grading=4).run(error="balances")
     with xarray.open_dataset(run.write(tmp_path / "run.nc")) as file:
         assert file.profile_2.dims == ("time", "x_2")
         np.testing.assert_allclose(file.x_2, 5e-3 * np.array(graded(10, 4)), rtol=1e-14)
@@ -181,7 +182,7 @@ def test_profiles_have_their_places_in_the_file(tmp_path):
 
 
 def test_profiles_are_drawn_over_places():
-    dataset = two(10).run().dataset
+    dataset = two(10).run(error="balances").dataset
     (axes,) = plots.figure(dataset, ["profile_1", "profile_2"]).axes
     assert len(axes.get_lines()) == 2 * dataset.sizes["time"]
     assert "Distance from the contact" in axes.get_xlabel()
@@ -232,11 +233,11 @@ def test_an_exact_solution_of_another_scene_is_not_used():
         "the heat capacity of glass varies": ["bodies.glass.capacity=quadratic"],
         "the conductivity of glass varies": [f"bodies.glass.conduction.conductivity={varying}"],
     }
-    cells = [f"bodies.{name}.conduction.cells={{accuracy: 1e-2}}" for name in ("epoxy", "glass")]
+    cells = [f"bodies.{name}.conduction.cells=4" for name in ("epoxy", "glass")]
     for reason, change in cases.items():
         source = surfacechem.run("sudden-contact", [*cells, *change, "run.until=1 s"]).accuracy.source
         assert reason in source
-        assert "half of the cells" in source
+        assert "one with cells that suit" in source
 
 
 # -- temperatures of slabs in closed form: Carslaw & Jaeger (1959), sections 2.7, 2.9, 3.4 and 3.11; lengths in units of
@@ -333,7 +334,7 @@ def test_an_error_that_does_not_converge_is_unknown():
     one_pair_differs = cell_errors({"T_1": 1e-4, "event times": np.inf}, {"T_1": 4e-4}, rtol=1e-11)
     assert not one_pair_differs.converged
     assert np.isnan(one_pair_differs.largest)
-    run = two(40).run()
+    run = two(4).run()
     estimate = with_cells(against_tighter(run.trajectory), found)
     assert np.isnan(estimate.error)
     assert estimate.source.startswith("unknown: the error of the cells")
@@ -398,7 +399,8 @@ def test_a_very_good_conductor_is_a_lump():
         f"bodies.{body}.conduction={{thickness: 1 mm, conductivity: 1e7 W/m/K, cells: 8}}"
         for body in ("lower", "upper")
     ]
-    lumped, divided = solved("three-temperatures"), surfacechem.run("three-temperatures", changes)
+    lumped = solved("three-temperatures")
+    divided = surfacechem.load("three-temperatures", changes).run(error="balances")
     for name in ("T_1", "T_2", "T_c", "U_1", "heat_into_1"):
         size = abs(lumped.dataset[name]).max()
         assert abs(divided.dataset[name] - lumped.dataset[name]).max() < 1e-6 * size

@@ -163,7 +163,7 @@ def differing(seeds):
     return found
 
 
-EACH_KIND = [seed for seed in range(24) if (seed - seed // 4) % 4 == 0]
+EACH_KIND = [seed for seed in range(16) if (seed - seed // 4) % 4 == 0]
 """Every mounting, and every law beside, in turn."""
 
 

@@ -7,6 +7,7 @@ import pytest
 from scenes import SITES, together
 from scipy.integrate import solve_ivp
 from solved import closed
+from zoo import pairwise
 
 import surfacechem
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
@@ -380,17 +381,18 @@ PRESSED = {
 """Loads by which the pressure falls to zero at 2 s, and grows by 1 MPa/s from 4 s on; the potential that bears them."""
 
 
-@pytest.mark.parametrize(("rate", "side"), [(1e-4, 1), (4.2e-4, -1), (7e-4, 1)])
-@pytest.mark.parametrize("stiffness", [{}, {"tangential-stiffness": {"E_t": 3e9}}], ids=["stiff", "elastic"])
-@pytest.mark.parametrize("by", PRESSED)
-def test_a_contact_closes_on_a_drive_that_has_reversed_in_the_air(by, stiffness, rate, side):
+DRIVES, STIFFNESSES = [(1e-4, 1), (4.2e-4, -1), (7e-4, 1)], [{}, {"tangential-stiffness": {"E_t": 3e9}}]
+
+
+@pytest.mark.parametrize(("by", "drive", "stiffness"), pairwise([*PRESSED], DRIVES, STIFFNESSES))
+def test_a_contact_closes_on_a_drive_that_has_reversed_in_the_air(by, drive, stiffness):
     """It slides on with the drive, by sliding friction, if that grows slower than the pull; else it sticks.
 
     The pull grows slower than what sticking bears, but for the fastest drive.
     """
     (load,), potentials = PRESSED[by][0].items(), PRESSED[by][1] | stiffness
     k = 1e9 if not stiffness else 1 / (1 / 1e9 + 1 / 3e9)
-    rate = rate * 1e9 / k
+    rate, side = drive[0] * 1e9 / k, drive[1]
     drive = {"times": [0.0, 3.0, 9.0], "values": [0.0, side * 3e-3, side * (3e-3 - 6 * rate)]}
     loads = {load[0]: {"table": {"times": [0.0, 0.1, 1.0, 2.0, 3.0, 4.0, 9.0], "values": load[1]}}}
     case = {
@@ -410,8 +412,7 @@ def test_a_contact_closes_on_a_drive_that_has_reversed_in_the_air(by, stiffness,
     np.testing.assert_allclose(found["t_t"][late], -side * pull * (found.dataset.time[late] - 4.0), rtol=1e-8)
 
 
-@pytest.mark.parametrize("rtol", [1e-11, 1e-12, 1e-13])
-@pytest.mark.parametrize("depth", ["2 um", "3 um"])
+@pytest.mark.parametrize(("depth", "rtol"), [("2 um", 1e-11), ("3 um", 1e-12), ("2 um", 1e-13)])
 def test_a_contact_that_closes_at_rest_sticks_whatever_roundoff_says(depth, rtol):
     """Adhesion beside friction is stiffest at touch, so that the interface rests there for a moment."""
     found = surfacechem.run(f"""

@@ -6,6 +6,7 @@ import math
 import cantera as ct
 import numpy as np
 import pytest
+from sampling import every
 
 import surfacechem
 from surfacechem.errors import InputError
@@ -251,19 +252,19 @@ def stirred(temperature, **options):
     return ct.IdealGasReactor(gas, clone=True, **options)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda at: setattr(at["feed"], "mass_flow_rate", 1e-4),
-        lambda at: setattr(at["feed"], "mass_flow_rate", lambda t: 1e-6 * t),
-        lambda at: setattr(at["wall"], "heat_transfer_coeff", 1e3),
-        lambda at: setattr(at["wall"], "area", 10.0),
-        lambda at: setattr(at["wall"], "heat_flux", 1.0),
-        lambda at: (setattr(at["source"].phase, "TPX", (500.0, ct.one_atm, "O2: 1")), at["source"].syncState()),
-        lambda at: (setattr(at["oven"].phase, "TP", (500.0, ct.one_atm)), at["oven"].syncState()),
-        lambda at: (at["wall"].__setattr__("area", 10.0), setattr(at["gas"], "energy_enabled", False)),
-    ],
-)
+CHANGES = [
+    lambda at: setattr(at["feed"], "mass_flow_rate", lambda t: 1e-6 * t),
+    lambda at: setattr(at["feed"], "mass_flow_rate", 1e-4),
+    lambda at: setattr(at["wall"], "heat_flux", 1.0),
+    lambda at: setattr(at["wall"], "heat_transfer_coeff", 1e3),
+    lambda at: (setattr(at["source"].phase, "TPX", (500.0, ct.one_atm, "O2: 1")), at["source"].syncState()),
+    lambda at: (setattr(at["oven"].phase, "TP", (500.0, ct.one_atm)), at["oven"].syncState()),
+    lambda at: (at["wall"].__setattr__("area", 10.0), setattr(at["gas"], "energy_enabled", False)),
+    lambda at: setattr(at["wall"], "area", 10.0),
+]
+
+
+@pytest.mark.parametrize("change", every(2, CHANGES))
 def test_what_a_script_changes_around_a_gas_takes_effect_at_once(change):
     """As after ``reinitialize``; without a change nothing starts anew."""
     found = []
@@ -433,7 +434,7 @@ def test_connectors_that_would_lose_something_are_refused_and_carry_nothing(conn
     with pytest.raises(InputError, match=message):
         connect(gas, interface)
     before = gas.mass, gas.phase.int_energy_mass
-    ReactorNet([gas, interface]).advance(1.0)
+    ReactorNet([gas, interface]).advance(0.05)
     assert (gas.mass, gas.phase.int_energy_mass) == pytest.approx(before, rel=1e-12)
 
 
@@ -530,7 +531,7 @@ def test_accounts_of_a_history_over_which_no_state_moves():
         assert float(interface.dataset[account][-1]) == pytest.approx(float(run[account][-1]), rel=1e-9)
 
 
-@pytest.mark.parametrize(("rtol", "within"), [(1e-4, 1e-4), (1e-6, 1e-6), (1e-9, 1e-8)])
+@pytest.mark.parametrize(("rtol", "within"), [(1e-4, 1e-4), (1e-9, 1e-8)])
 def test_accounts_of_an_interface_alone(rtol, within):
     """The first bonds produce entropy that the integrator's steps do not resolve; bonds follow from the states."""
     known = surfacechem.run("dna-adhesive", {"run.until": "10 s", "run.rtol": 1e-12})
@@ -589,7 +590,7 @@ def test_a_load_that_does_not_change():
     interfaces = [InterfaceReactor(PISTON) for _ in range(3)]
     for interface, load in zip(interfaces, (lambda _: 1e3, 1e3, "1 kPa"), strict=True):
         interface.load("F_n", load)
-        ReactorNet([interface]).advance(0.1)
+        ReactorNet([interface]).advance(0.01)
     assert interfaces[0]["g_n"] == interfaces[1]["g_n"] == interfaces[2]["g_n"] > 0
 
 

@@ -27,7 +27,7 @@ EVERYWHERE = [(name, accuracy) for accuracy in ACCURACIES for name in exact(accu
 @pytest.mark.parametrize(
     ("name", "accuracy"),
     [
-        *((name, accuracy) for name in QUICK for accuracy in ACCURACIES[::2]),
+        *((name, accuracy) for name in QUICK for accuracy in ACCURACIES[::4]),
         *(pytest.param(*each, marks=pytest.mark.slow) for each in EVERYWHERE),
     ],
 )

@@ -15,6 +15,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray
+from sampling import every
 from typer.testing import CliRunner
 
 import surfacechem
@@ -108,7 +109,7 @@ def streams(tmp_path_factory):
     return stream
 
 
-@pytest.mark.parametrize("name", SWEPT)
+@pytest.mark.parametrize("name", every(2, SWEPT))
 def test_what_is_kept_of_a_run_is_that_of_the_run_by_itself(name, streams):
     stream = streams(name, "named")
     simulation, data = stream.chunks.simulation, stream.store.dataset
@@ -133,7 +134,7 @@ def test_what_is_kept_of_a_run_is_that_of_the_run_by_itself(name, streams):
             assert event in [one["time_reached"], *(one[key] for key in one if key.startswith("time_"))]
 
 
-@pytest.mark.parametrize("name", SWEPT)
+@pytest.mark.parametrize("name", every(2, SWEPT))
 def test_the_method_that_suits_the_scene_keeps_the_same_values(name, streams):
     named, suited = (streams(name, way) for way in ("named", "suited"))
     wanted, found = named.store.dataset, suited.store.dataset
@@ -147,7 +148,7 @@ def test_the_method_that_suits_the_scene_keeps_the_same_values(name, streams):
         assert np.all(found[balance] < 1e-9)
 
 
-@pytest.mark.parametrize("name", SWEPT)
+@pytest.mark.parametrize("name", every(2, SWEPT))
 def test_without_balances_the_rest_is_the_same(name, streams):
     stream = streams(name, "bare")
     assert stream.chunks.model.program.ledger is None
@@ -387,17 +388,20 @@ def test_a_full_disk_is_an_error_of_a_line_and_loses_nothing(whole, tmp_path, mo
     assert digest(path) == digest(whole)
 
 
-def test_a_killed_worker_of_a_cluster_changes_no_byte(whole, tmp_path):
+@pytest.mark.parametrize("killed", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_cluster_changes_no_byte_even_where_a_worker_is_killed(whole, tmp_path, killed):
+    """Workers that share this process are there at once, but cannot be killed."""
     distributed = pytest.importorskip("distributed")
+    workers = {"n_workers": 2, "threads_per_worker": 1, "processes": killed}
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.LocalCluster(**workers, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):
         victim = next(iter(client.run(os.getpid).values()))
         told = []
 
         def kill(progress):
-            if progress.done == 16:
+            if killed and progress.done == 16:
                 os.kill(victim, signal.SIGKILL)
             told.append(progress)
 

@@ -98,7 +98,7 @@ def assert_alike(found, wanted, n, tolerance):
         assert found.outputs[i, shown, :n] == pytest.approx(wanted.outputs[i, shown, :n], rel=tolerance, abs=tolerance)
 
 
-@pytest.mark.parametrize(("name", "others", "implicit"), METHODS)
+@pytest.mark.parametrize(("name", "others", "implicit"), every(2, METHODS))
 def test_runs_are_those_of_one_at_a_time(name, others, implicit, left):
     problem, columns = arrays_of(case_runs.load(name), implicit=implicit)
     found = lane_batch.solve_batch(problem, *columns)
@@ -341,7 +341,7 @@ def test_a_quotient_of_a_few_states_is_looked_at_only_where_its_divisor_changes(
 
 
 @pytest.mark.parametrize("implicit", [False, True])
-@pytest.mark.parametrize("seed", every(4, range(80)))
+@pytest.mark.parametrize("seed", every(10, range(80)))
 def test_what_is_narrow_is_seen(seed, implicit, left):
     scene = narrow_scenes.scene(seed)
     simulation = surfacechem.load(scene.text)
