@@ -63,18 +63,6 @@ def find_magnitudes(w: Any) -> None:
 
 
 @compiled
-def _find_guards(w: Any) -> None:
-    """Evaluate the guards at the moment, with consistent rates and algebraic variables among the inputs."""
-    copy(w.moment, w.inputs)
-    for j in range(w.n):
-        w.trial[j], w.trial_dot[j] = w.moment[1 + j], 0.0
-    if w.n_margins > 0:
-        find_consistent(w)
-        set_inputs(w, w.trial, w.trial_dot)
-        evaluate(w, MARGINS, w.margin_probe)
-
-
-@compiled
 def _closing(w: Any, m: int) -> int:
     """Return CLOSED if the guard of an edge is below zero by more than the drift, RESTING or NEAR if it is zero."""
     value, size, small = w.margin_probe[m], w.magnitude[m], GUARD_EPS * w.magnitude[m]
@@ -117,7 +105,13 @@ def resolve(w: Any, i: int, end: float) -> bool:
             return False
         find_magnitudes(w)
         find_active(w)
-        _find_guards(w)
+        copy(w.moment, w.inputs)
+        for j in range(w.n):
+            w.trial[j], w.trial_dot[j] = w.moment[1 + j], 0.0
+        if w.n_margins > 0:
+            find_consistent(w)
+            set_inputs(w, w.trial, w.trial_dot)
+            evaluate(w, MARGINS, w.margin_probe)
         for m in range(first if w.jump_times[-1] >= 0.0 else 0):  # limits beyond which a jump has carried the state
             slack = 0.0 if w.kinds[m, 5] == 1 else GUARD_EPS * w.magnitude[m]
             if w.kinds[m, 0] == 1 and w.active[m] == 1 and w.margin_probe[m] < -slack:

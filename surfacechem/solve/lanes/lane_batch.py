@@ -40,9 +40,8 @@ def _solved(problem: Problem, method: "LaneMethod | None", columns: Sequence[Arr
         return solve_arrays(problem, *columns, room=room)
     lanes = problem.program.lanes if method is EXPLICIT else problem.program.implicit_lanes
     assert lanes is not None
-    y0, parameters, spacing, *others = map(np.ascontiguousarray, columns)
-    runs = y0, parameters, spacing, np.array((problem.max_steps,)), *others
-    batch = batch_of(problem, runs, room, problem.program.lane_tables(lanes, method is ROSENBROCK))
+    tables = problem.program.lane_tables(lanes, method is ROSENBROCK)
+    batch = batch_of(problem, [*map(np.ascontiguousarray, columns)], room, tables)
     run(batch, method)
     return batch
 
@@ -83,10 +82,10 @@ def _method(words: str, memory: Mapping[str, Any], module: str, function: str, *
     return LaneMethod(words, stepper.Loop(sources, f"{__package__}.{module}", function, brief=True), memory)
 
 
-EXPLICIT = _method("explicit steps of order 8", EXPLICIT_MEMORY, "lane_run", "run_explicitly")
-_LINEARLY = "linearly implicit steps of order 5", ROSENBROCK_MEMORY, "rosenbrock_lanes", "run_linearly"
+EXPLICIT = _method("by explicit steps of order 8", EXPLICIT_MEMORY, "lane_run", "run_explicitly")
+_LINEARLY = "by linearly implicit steps of order 5", ROSENBROCK_MEMORY, "rosenbrock_lanes", "run_linearly"
 ROSENBROCK = _method(*_LINEARLY, "radau_lanes", "rosenbrock_lanes")
-RADAU = _method("Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "radau_lanes")
+RADAU = _method("by Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "radau_lanes")
 
 
 def methods_of(problem: Problem) -> Iterator[LaneMethod]:

@@ -283,16 +283,6 @@ def _correct(w: Any, active: Any) -> Any:
 
 
 @compiled
-def _roundoff(w: Any) -> Any:
-    """The roundoff of the states, also of one that grows from zero to its last stage, in units of the tolerance."""
-    found = same(0.0)
-    for m in range(w.n):
-        size = larger(absolute(lanes(w.z[STAGES - 1, m])), absolute(lanes(w.y[m])))
-        found = larger(found, EPS * size / lanes(w.weight[m]))
-    return found
-
-
-@compiled
 def _solve_stages(w: Any) -> Any:
     """Iterate to the tolerance in each lane; return the mask of lanes in which it is met.
 
@@ -319,7 +309,11 @@ def _solve_stages(w: Any) -> Any:
             theta = where(active, rate, theta)
             contraction = where(active, larger(rate / (1.0 - rate), same(newton.SLOWEST_KNOWN)), contraction)
         # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
-        met = norm <= newton.ROUNDINGS * _roundoff(w)
+        roundoff = same(0.0)  # of the states, also of one that grows from zero to its last stage
+        for m in range(w.n):
+            size = larger(absolute(lanes(w.z[STAGES - 1, m])), absolute(lanes(w.y[m])))
+            roundoff = larger(roundoff, EPS * size / lanes(w.weight[m]))
+        met = norm <= newton.ROUNDINGS * roundoff
         if iteration > 0 or w.rtol < tables.COARSE_RTOL:
             met = met | (goes_on & (contraction * norm <= newton.NEWTON_PART))
         solved = solved | (active & met)

@@ -60,25 +60,6 @@ def _evaluate_stage(w: Any, h: float, i: int, change: Any) -> None:
 
 
 @compiled
-def _interpolate(w: Any, h: float) -> bool:
-    """Evaluate the further stages and the dense output, as changes at the nodes of the implicit stages; True if
-    finite.
-    """
-    n, z = w.n, w.z
-    for i in range(tables.STAGES_OF_DENSE, tables.LAST_STAGE + 1):
-        _evaluate_stage(w, h, i, w.parts[0])
-    w.residuals += tables.LAST_STAGE + 1 - tables.STAGES_OF_DENSE
-    for i in range(7):
-        _at_nodes(i, w.k.ctypes.data, n, n, z[i].ctypes.data)
-    total = 0.0
-    for i in range(7):
-        for m in range(n):
-            z[i, m] *= h
-            total += 0.0 * z[i, m]
-    return bool(total == 0.0)
-
-
-@compiled
 def step_explicitly(w: Any, h: float, worst: float) -> float:
     """Return the norm of the local error of a step of this size, infinite where rates are not finite.
 
@@ -103,7 +84,20 @@ def step_explicitly(w: Any, h: float, worst: float) -> float:
         largest, second = max(largest, abs(errors[0, m]) * rate), max(second, abs(errors[4, m]) * rate)
     # The estimate of fifth order, made one of seventh by that of third.
     norm = largest * largest / (ERROR_PART * np.sqrt(largest * largest + 0.01 * second * second + TINY))
-    return norm if norm < worst and _interpolate(w, h) else max(norm, worst)
+    if not norm < worst:
+        return max(norm, worst)
+    # The further stages and the dense output, as changes at the nodes of the implicit stages.
+    for i in range(tables.STAGES_OF_DENSE, tables.LAST_STAGE + 1):
+        _evaluate_stage(w, h, i, w.parts[0])
+    w.residuals += tables.LAST_STAGE + 1 - tables.STAGES_OF_DENSE
+    total, z = 0.0, w.z
+    for i in range(7):
+        _at_nodes(i, w.k.ctypes.data, n, n, z[i].ctypes.data)
+    for i in range(7):
+        for m in range(n):
+            z[i, m] *= h
+            total += 0.0 * z[i, m]
+    return norm if total == 0.0 else max(norm, worst)
 
 
 @compiled

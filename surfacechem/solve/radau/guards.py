@@ -364,29 +364,24 @@ def _step_implicitly(w: Any, size: float) -> float:
 
 
 @compiled
-def _step_onto(w: Any, size: float) -> float:
-    """Repeat the step with another size and the full order of the method, and evaluate the margins at its end; return
-    the norm of its error.
+def _step_onto(w: Any, size: float, worst: float) -> float:
+    """Repeat the step with another size and the full order of the method, and evaluate the margins at its end.
+
+    Return the size, or 0 if the step fails or its error is not below ``worst``.
     """
     norm = step_explicitly(w, size, np.inf) if w.explicit != 0 else _step_implicitly(w, size)
     if not norm < np.inf:
-        return np.inf
+        return 0.0
     finish_step(w, size)
     set_stage(w, stage_count(w.member) - 1, size)
     evaluate(w, MARGINS, w.margin)
-    return norm
+    return size if norm < worst else 0.0
 
 
 @compiled
 def _resolution(w: Any, size: float) -> float:
     """Return the resolution of time at the end of a step: half the spacing of doubles there."""
     return float(0.5 * EPS * (abs(w.base + w.tau) + size))
-
-
-@compiled
-def _onto(w: Any, size: float, worst: float) -> float:
-    """Repeat the step; return its size, or 0 if it fails or its error is not below ``worst``."""
-    return size if _step_onto(w, size) < worst else 0.0
 
 
 @compiled
@@ -402,7 +397,7 @@ def _refine(w: Any, h: float, m: int, x: float, worst: float) -> float:
     store_polynomial(w, h, 0.0)
     resolution = _resolution(w, size)
     for attempt in range(12):
-        if _onto(w, size, worst) == 0.0:
+        if _step_onto(w, size, worst) == 0.0:
             return 0.0
         value = w.margin[m]
         change = -value / slope * h if slope != 0.0 else 0.0
@@ -412,7 +407,7 @@ def _refine(w: Any, h: float, m: int, x: float, worst: float) -> float:
             return size
         if abs(value) > 2.0 * closest + ALIKE_NOISE * noise(w, m):
             # Its closest value counts as zero if it is noise; otherwise the polynomial was too coarse.
-            return _onto(w, best, worst) if closest <= ALIKE_NOISE * noise(w, m) else 0.0
+            return _step_onto(w, best, worst) if closest <= ALIKE_NOISE * noise(w, m) else 0.0
         if abs(value) < closest:
             best, closest = size, abs(value)
         if not crossed and abs(change) <= resolution:
@@ -422,7 +417,7 @@ def _refine(w: Any, h: float, m: int, x: float, worst: float) -> float:
             nudge = 0.0
         # The secant may be wrong near a kink: change the step by at most a factor of two.
         size = min(max(size + change, 0.5 * size), min(2.0 * size, 1.25 * h))
-    return _onto(w, size, worst)
+    return _step_onto(w, size, worst)
 
 
 @compiled
@@ -435,12 +430,12 @@ def _short_of(w: Any, h: float, m: int, size: float) -> float:
     # Double the distance at each attempt, so that few are needed for any slope.
     for attempt in range(40):
         shorter = size - _resolution(w, size) * 2.0**attempt
-        if not (shorter > 0.5 * size and _step_onto(w, shorter) < np.inf):
+        if not (shorter > 0.5 * size and _step_onto(w, shorter, np.inf) > 0.0):
             break
         nearest = 2.0 * slope * (size - shorter)
         if 0.0 < w.margin[m] * side <= max(nearest, noise(w, m)):
             return shorter
-    _step_onto(w, size)
+    _step_onto(w, size, np.inf)
     return size
 
 

@@ -364,7 +364,10 @@ def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, 
 @compiled
 def solve_real(w: Any, x: Any) -> None:
     """Overwrite a right-hand side by the solution of the real Newton system."""
-    _solve_chained(w.chains, w.real, w.real_border, w.real_bands, w.order[0], w.places[0], x)
+    if w.links > 0:
+        _solve_chained(w.chains, w.real, w.real_border, w.real_bands, w.order[0], w.places[0], x)
+    else:
+        solve(w.real, w.order[0], w.places[0], x)
 
 
 @compiled
@@ -395,5 +398,8 @@ def bound_real(w: Any, x: Any) -> None:
 @compiled
 def solve_complex(w: Any, pair: int, x: Any) -> None:
     """Overwrite a right-hand side by the solution of the complex Newton system of one pair of eigenvalues."""
-    border, bands = w.complex_border[pair], w.complex_bands[pair]
-    _solve_chained(w.chains, w.complex[pair], border, bands, w.order[1 + pair], w.places[1 + pair], x)
+    if w.links > 0:
+        border, bands = w.complex_border[pair], w.complex_bands[pair]
+        _solve_chained(w.chains, w.complex[pair], border, bands, w.order[1 + pair], w.places[1 + pair], x)
+    else:
+        solve(w.complex[pair], w.order[1 + pair], w.places[1 + pair], x)

@@ -102,12 +102,17 @@ def _usual_room(problem: Problem, steps: int, events: int) -> Room:
 
 
 def batch_of(
-    problem: Problem, runs: Sequence[Array], room: Room | None = None, tables: Sequence[NDArray[Any]] | None = None
+    problem: Problem,
+    runs: Sequence[Array],
+    room: Room | None = None,
+    tables: Sequence[NDArray[Any]] | None = None,
+    max_steps: Sequence[int] = (),
 ) -> Any:
     """Return a batch of runs of a problem.
 
-    The runs share with it all but their y0, parameters, spacing, max_steps, peaks, segments and times, which are given
-    in this order with the run as first axis. ``room`` and ``tables`` replace the usual memory and the program's tables.
+    The runs share with it all but their y0, parameters, spacing, peaks, segments and times, which are given in this
+    order with the run as first axis. ``room``, ``tables`` and ``max_steps`` replace the usual memory, the program's
+    tables and the limit of the problem.
     """
     program, times = problem.program, runs[-1]
     explicit = tables is None and problem.explicit and program.rates is not None
@@ -126,6 +131,7 @@ def batch_of(
         int(problem.continued),
         problem.line_error,
         problem.elapsed,
+        np.array(max_steps or (problem.max_steps,)),
         *runs,
         np.empty((count, 1 + 2 * n + q + m)),
         np.zeros((count, COLUMNS), np.int64),
@@ -144,8 +150,8 @@ def _run_one(problem: Problem, room: Room | None = None) -> Any:
     y0, parameters, segments, times = (
         _floats(values)[None] for values in (problem.y0, problem.parameters, problem.segments, problem.times)
     )
-    columns = y0, parameters, np.array((problem.spacing,)), np.array((problem.max_steps,)), _peaks(problem)[None]
-    batch = batch_of(problem, (*columns, segments, times), room or _usual_room(problem, ALONE_ROWS, ALONE_ROWS))
+    columns = y0, parameters, np.array((problem.spacing,)), _peaks(problem)[None], segments, times
+    batch = batch_of(problem, columns, room or _usual_room(problem, ALONE_ROWS, ALONE_ROWS))
     if problem.max_seconds is None:
         stepper.run(batch)
         return batch
@@ -228,14 +234,17 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
 
     own = [(each.y0, each.parameters, each.spacing, _peaks(each)) for each in problems]
     y0, parameters, spacing, peaks = (np.array(values, float) for values in zip(*own, strict=True))
-    max_steps = np.array([each.max_steps for each in problems])
     most = max(len(each.times) for each in problems)
     # Outputs are padded with infinite times, which no run reaches.
     times = np.full((len(problems), most), np.inf)
     for row, each in zip(times, problems, strict=True):
         row[: len(each.times)] = each.times
     segments = shared([each.segments for each in problems])
-    batch = batch_of(problems[0], (y0, parameters, spacing, max_steps, peaks, segments, shared(times)))
+    columns, max_steps = (
+        (y0, parameters, spacing, peaks, segments, shared(times)),
+        [each.max_steps for each in problems],
+    )
+    batch = batch_of(problems[0], columns, max_steps=max_steps)
     stepper.run(batch)
     return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
 
@@ -305,8 +314,7 @@ def solve_arrays(problem: Problem, *columns: Array, room: Room | None = None) ->
     These are given in this order with the run as first axis, which has length one where a value is the same for all.
     The rows of the batch are as the stepper writes them; ``room`` replaces the usual memory for each run.
     """
-    y0, parameters, spacing, *others = map(np.ascontiguousarray, columns)
-    batch = batch_of(problem, (y0, parameters, spacing, np.array((problem.max_steps,)), *others), room)
+    batch = batch_of(problem, [*map(np.ascontiguousarray, columns)], room)
     stepper.run(batch)
     return batch
 
@@ -328,8 +336,8 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
     rows, nothing = np.zeros((1, 0)), _no_rows(len(ends))
     return Batch(
         *program.tables, NO_EDGES.words,
-        1.0, np.ones(program.n), 0, _kinds(()), 0, 0.0, 0.0,
-        ends, table, np.zeros(0), np.empty(0, np.int64), rows, rows, rows, ends, counts,
+        1.0, np.ones(program.n), 0, _kinds(()), 0, 0.0, 0.0, np.empty(0, np.int64),
+        ends, table, np.zeros(0), rows, rows, rows, ends, counts,
         *(nothing,) * 4, rows, *(nothing,) * 2,
     )  # fmt: skip
 

@@ -58,11 +58,12 @@ BATCH: dict[str, tuple[Any, int]] = {
     "line_error": (float, 0),
     # time from the start of the run to that of the problem
     "elapsed": (float, 0),
+    # most steps, one number for all runs or one each
+    "max_steps": (np.int64, 1),
     # the runs; all but the first two have a single row if it is the same for all runs
     "y0": (float, 2),
     "parameters": (float, 3),
     "spacing": (float, 1),
-    "max_steps": (np.int64, 1),
     # largest accounts and guards so far, then least and largest states if states are stored for interpolation
     "peaks": (float, 2),
     "segments": (float, 2),
