@@ -1,7 +1,7 @@
 """Cantera's ReactorNet under the contract, and the reactor that holds a system of this package in a network.
 
-Cantera has one absolute tolerance for all variables, so each variable is given in units of its own tolerance. Values
-inside the last step come from the integrator's polynomial, whose derivatives it provides at the end of the step.
+Cantera has one absolute tolerance for all variables, so variables of unlike tolerances are given in units of
+these. Values inside the last step come from the integrator's polynomial, whose derivatives it provides at its end.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ import numpy as np
 
 from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.solve.adapters.dense_step import DenseStep, Steps, at_nodes, hermite, on_step
-from surfacechem.solve.adapters.evaluation import Evaluation
-from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
+from surfacechem.solve.adapters.stepping import MOST_TOGETHER, Method, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array, Counters
 from surfacechem.tolerances import FORMULA_EPS, TINY
 
@@ -105,10 +104,16 @@ def _switch(name: str) -> property:
     return property(lambda self: self.switches[name][0], change)
 
 
-def hook(method: Any) -> Any:
-    """Keep the signature of a hook, for which Cantera asks in every reactor that is made."""
-    method.__signature__ = inspect.signature(method)
-    return method
+class hook:  # noqa: N801 - a decorator
+    """A method that Cantera calls, with its signature: Cantera asks for it in every reactor that is made."""
+
+    def __init__(self, method: Callable[..., Any]) -> None:
+        self.method, self.signature = method, inspect.signature(partial(method, None))
+
+    def __get__(self, reactor: Any, _: type) -> Callable[..., Any]:
+        bound = partial(self.method, reactor)
+        bound.__signature__ = self.signature  # type: ignore[attr-defined]
+        return bound
 
 
 class StateVectorReactor(cantera.ExtensibleReactor):
@@ -202,7 +207,7 @@ class StateVectorReactor(cantera.ExtensibleReactor):
 
 
 class _SystemReactor(StateVectorReactor):
-    """The equations of an arc, in units of their tolerances, and the ledger if rates come from external code.
+    """The equations of an arc, and the ledger if rates come from external code.
 
     Published mechanisms have reactions that run both ways far faster than anything else changes. Their balance along
     the integrator's polynomial is inaccurate, and they magnify this error in a quadrature along it, but not if the
@@ -211,38 +216,44 @@ class _SystemReactor(StateVectorReactor):
 
     def __init__(self, surface: Any, view: View, x: Array) -> None:
         super().__init__(surface)
-        self.view, evaluation = view, Evaluation(view.program, view.y, view.parameters)
-        self.count = len(x)
         lines = view.program.n_ledger if view.program.external else 0
-        self.unit = np.concatenate((np.maximum(view.atol, TINY), np.full(lines, LEDGER_UNIT)))
-        self.x = np.concatenate((x, np.zeros(lines))) if lines or len(view.algebraic) else evaluation.y
-        self.differential = self.x[: self.count]
-        self.names = tuple(f"x{i}" for i in range(len(self.unit)))
-        self.reach, self.slopes = evaluation.reach, evaluation.rates if lines else evaluation.slopes
+        unit = np.concatenate((np.maximum(view.atol, TINY), np.full(lines, LEDGER_UNIT)))
+        self.tolerance = float(unit[0]) if np.all(unit == unit[0]) else 1.0
+        self.unit = unit / self.tolerance
+        self.count = len(x)
+        self.names = tuple(f"x{i}" for i in range(len(unit)))
+        self._x = np.empty_like(unit) if lines or len(view.algebraic) else view.y
+        self.scaled = self._x if self.tolerance != 1.0 else np.empty_like(unit)
+        """Present variables in their units, into which Cantera's are copied."""
+        self.scaled[:] = np.concatenate((x, np.zeros(lines))) / self.unit
+        self._scaled, self._differential = self.scaled.data, self._x[: self.count] if lines else self._x
+        self._reach, self._slopes = view.reach, view.rates if lines else view.slopes
 
     def start(self) -> Array:
-        return self.x / self.unit
+        return self.scaled
 
     # Cantera calls these more often than the steps that it takes, so they go no further than to the equations.
 
     @hook
     def replace_update_state(self, y: Any) -> None:
-        np.multiply(np.frombuffer(y), self.unit, out=self.x)  # a buffer is read in a third of the time of a sequence
+        self._scaled[:] = y  # NumPy takes ten times as long to copy it
 
     @hook
     def replace_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
         if self.error is not None:
             raise self._failure(self.error)
-        self.view.residuals += 1
+        if self.scaled is not self._x:
+            np.multiply(self.scaled, self.unit, self._x)
         try:
-            found = self.reach(t, self.differential)
+            found = self._reach(t, self._differential)
         except Exception as error:
             self.error = error
             raise self._failure(error) from None
         # Cantera itself rejects rates that are not finite, as it does this error.
         if not found:
             raise BackOffError("no consistent state")
-        np.divide(self.slopes(), self.unit, out=np.frombuffer(rhs))
+        # A buffer is read in a third of the time of a sequence.
+        np.divide(self._slopes(), self.unit, np.frombuffer(rhs))
 
 
 def last_step(net: Any, start: float, end: float) -> DenseStep:
@@ -257,16 +268,18 @@ def last_step(net: Any, start: float, end: float) -> DenseStep:
 
 
 class _Stretch(Method):
+    together = MOST_TOGETHER
+
     def __init__(self, view: View, t: float, end: float, y: Array) -> None:
         self.reactor = _SystemReactor(_nothing(), view, y[view.differential])
         self.net = cantera.ReactorNet([self.reactor])
-        self.net.rtol, self.net.atol = view.problem.rtol, 1.0
+        self.net.rtol, self.net.atol = view.problem.rtol, self.reactor.tolerance
         self.net.initial_time = t
         self.longest = min(LONGEST_STEP * (end - t), view.problem.spacing)
         self.t, self.end = t, end
         self.net.max_time_step = self.longest
-        self.last: Array | None = None
-        """Variables and their first two derivatives after the last step."""
+        self.last: list[Array] | None = None
+        """Variables, in their units, and their first two derivatives after the last step."""
         self.failure: Exception | None = None
 
     def advance(self) -> DenseStep:
@@ -274,7 +287,7 @@ class _Stretch(Method):
 
     def several(self, most: int) -> Steps:
         reactor, step, derivative = self.reactor, self.net.step, self.net.get_derivative
-        times, found = [self.t], [reactor.x.copy()] if self.last is None else [*self.last]
+        times, found = [self.t], [*(self.last or [reactor.scaled.copy()])]
         while len(times) <= most and self.t < self.end and self.failure is None:
             # Cantera has no stop time, and a step beyond the end would miss what changes there.
             if self.end - self.t < self.longest:
@@ -288,7 +301,7 @@ class _Stretch(Method):
                     curvatures = derivative(2)
                 except cantera.CanteraError:  # the first polynomial is a straight line
                     curvatures = np.zeros_like(slopes)
-                found += reactor.x.copy(), slopes, curvatures
+                found += reactor.scaled.copy(), slopes, curvatures
                 times.append(self.t)
             except (cantera.CanteraError, ArithmeticError, StepError) as error:
                 self.failure = error  # an event may lie before it
@@ -296,10 +309,8 @@ class _Stretch(Method):
             raise StepError(str(self.failure)) from self.failure
         if self.last is None:  # the first polynomial is a straight line
             found[1:1] = found[2:4]
-        ends = np.concatenate(found).reshape(len(times), 3, -1)
-        self.last = ends[-1].copy()
-        ends[:, 1:] *= reactor.unit
-        rows = hermite(np.diff(times), ends)
+        self.last = found[-3:]
+        rows = hermite(np.diff(times), np.concatenate(found).reshape(len(times), 3, -1) * reactor.unit)
         return Steps(np.array(times), partial(self._step, times, rows), at_nodes(rows[..., : reactor.count]))
 
     def _step(self, times: Sequence[float], rows: Array, k: int) -> DenseStep:
@@ -313,6 +324,7 @@ class _Stretch(Method):
     def counters(self) -> Counters:
         told = self.net.solver_stats
         return Counters(
+            residuals=int(told["rhs_evals"] + told["lin_rhs_evals"]),
             rejected=int(told["err_test_fails"] + told["nonlinear_conv_fails"]),
             jacobians=int(told["jac_evals"]),
             factorizations=int(told["lin_solve_setups"]),

@@ -55,17 +55,19 @@ class Evaluation:
 
         Without any of these, derivatives may not be finite.
         """
+        if self._rates is not None:
+            self.inputs[0] = t
+            if differential is not self.y:
+                self.y[:] = differential
+            if self._external is not None:
+                self._fill(self._external)
+            self._rates()
+            return True
         # At the same time start from the same guess: an integrator that takes differences over 1e-27 m would
         # otherwise divide the roundoff of two searches by it, and accept a wrong step as needing no correction.
         if t != self.inputs[0]:
             self.guess = self._found
             self.inputs[0] = t
-        if self._rates is not None:
-            self.y[:] = differential
-            if self._external is not None:
-                self._fill(self._external)
-            self._rates()
-            return True
         self.y[self.free] = differential
         self.y[self.algebraic] = self.guess
         self.ydot[:] = 0.0

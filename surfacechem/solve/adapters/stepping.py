@@ -20,7 +20,7 @@ ENTROPY_GROUP = 1
 MAX_DEFECT = 100.0
 """Defect, in tolerances, above which a step has missed something before an event."""
 
-FIRST_TOGETHER, TOGETHER_GROWTH, MOST_TOGETHER = 16, 16, 256
+FIRST_TOGETHER, TOGETHER_GROWTH, MOST_TOGETHER = 16, 4, 256
 """Number of steps for which the equations are evaluated together: at first, its growth, and at most. Steps beyond an
 event are wasted; between 64 and 256 the maximum makes no difference to a run of a hundred reactions.
 """
@@ -86,6 +86,9 @@ class View(Evaluation):
 
 class Method(ABC):
     """One library method running over one interval without breakpoints."""
+
+    together = FIRST_TOGETHER
+    """Number of steps that are taken before the first look at margins, in a run without an event so far."""
 
     @abstractmethod
     def several(self, most: int) -> Steps:
@@ -257,15 +260,19 @@ class _Run:
     def _within_budget(self, most: int) -> int:
         """Return this number of steps, or the number that the budget allows at the pace so far, at least one."""
         most, limit = min(most, self.problem.max_steps - self.count), self.problem.max_seconds
-        if limit is None or not self.count:
+        if limit is None:
             return most
+        if not self.count:
+            return min(most, FIRST_TOGETHER)
         passed = time.monotonic() - self.started
         return max(1, min(most, int(self.count * (limit - passed) / passed)))
 
     def _to_event(self, method: Method, end: float) -> list[int]:
         """Step until an event, the end, or the end of the budget; return the margins that fired."""
         # Algebraic variables are searched from those of the last step, which must be close: one step at a time.
-        start, most = self.t, 1 if len(self.view.algebraic) else FIRST_TOGETHER
+        eventful = bool(self.fired) or self.problem.margin_peaks is not None
+        most = FIRST_TOGETHER if eventful else method.together
+        start, most = self.t, 1 if len(self.view.algebraic) else most
         while self.t < end and self._over_budget() is None:
             before = time.perf_counter()
             steps = method.several(self._within_budget(most))
