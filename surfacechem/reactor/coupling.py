@@ -23,7 +23,7 @@ from surfacechem.laws.loading import Hold
 from surfacechem.mechanism.evaluated import Neighbour, SurfaceEngine
 from surfacechem.model.components.interface import LOADABLE
 from surfacechem.quantities import VARIABLES
-from surfacechem.scene import Body, Scene
+from surfacechem.scene import Scene
 from surfacechem.solve.adapters.cantera_network import StateVectorReactor
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import RUN_EPS
@@ -292,7 +292,12 @@ def with_neighbours(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
     for name, own in engine.surface.adjacent.items():
         if name in reactors:
             _refuse_other_phase(name, own, reactors[name].phase)
-    states = {name: _state(reactor.phase) for name, reactor in reactors.items()}
+    states = {}
+    for name, reactor in reactors.items():
+        phase = reactor.phase
+        parts = dict(zip(phase.species_names, phase.X.tolist(), strict=True)) if phase.n_species > 1 else {}
+        given = {species: Hold(level=part) for species, part in parts.items()}
+        states[name] = Neighbour(Hold(level=float(phase.P)), given)
     return replace(scene, interface=replace(scene.interface, engine=engine.with_neighbours(states)))
 
 
@@ -327,31 +332,21 @@ def _agreement(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
             yield f"{what} at {T:g} K", isclose(*found, rel_tol=RUN_EPS, abs_tol=RUN_EPS * TERM_SIZE * unit)
 
 
-def _state(phase: Any) -> Neighbour:
-    """Return the present state of a phase."""
-    parts = zip(phase.species_names, phase.X.tolist(), strict=True)
-    several = phase.n_species > 1
-    return Neighbour(Hold(level=float(phase.P)), {name: Hold(level=part) for name, part in parts} if several else {})
-
-
 def with_reactors(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
     """Return the scene with bodies whose temperatures are set during a run."""
-    first, second = (_replaced(body, reactors.get(body.name)) for body in scene.bodies)
-    for name in reactors:
+    bodies = {body.name: body for body in scene.bodies}
+    for name, reactor in reactors.items():
         if suffix_of(scene, name) == "c":
             raise InputError("a reactor can take the place of a body, not of the interface.")
+        body = bodies[name]
+        if body.energy is not None or not isinstance(body.temperature, Load):
+            raise InputError(
+                f"a reactor takes the place of {name}, so the case must not give it a heat capacity or a temperature "
+                f"that it shares. Write `{name}: {{temperature: 300 K}}`; the value is not used."
+            )
+        bodies[name] = replace(body, temperature=Hold(level=float(reactor.T)))
+    first, second = bodies.values()
     return replace(scene, bodies=(first, second))
-
-
-def _replaced(body: Body, reactor: Any) -> Body:
-    if reactor is None:
-        return body
-    if body.energy is not None or not isinstance(body.temperature, Load):
-        raise InputError(
-            f"a reactor takes the place of {body.name}, so the case must not give it a heat capacity or a temperature "
-            f"that it shares. Write `{body.name}: {{temperature: 300 K}}`; the value is not used."
-        )
-    return replace(body, temperature=Hold(level=float(reactor.T)))
 
 
 class HeatWall(cantera.Wall):
@@ -399,20 +394,19 @@ class BodyPort:
 
     def heat(self) -> float:
         """Return the heat [W] that flows into the body through its walls."""
-        return sum(self._through(wall) for wall in self.reservoir.walls)
+        heat = 0.0
+        for wall in self.reservoir.walls:
+            if wall.expansion_rate != 0.0:
+                raise InputError(self.reservoir.rigid())
+            if wall.heat_flux != 0.0:
+                raise InputError(
+                    f"a wall on {self.name} has a heat flux of its own, whose time is not known here. Give the wall U "
+                    f"or an emissivity, or prescribe {self.heat_name} under `loading`."
+                )
+            heat += -wall.heat_rate if wall.left_reactor is self.reservoir else wall.heat_rate
+        return heat
 
     def others(self) -> list[Any]:
         """Return the reactors on the other sides of its walls."""
         sides = ((wall.left_reactor, wall.right_reactor) for wall in self.reservoir.walls)
         return [right if left is self.reservoir else left for left, right in sides]
-
-    def _through(self, wall: Any) -> float:
-        if wall.expansion_rate != 0.0:
-            raise InputError(self.reservoir.rigid())
-        if wall.heat_flux != 0.0:
-            raise InputError(
-                f"a wall on {self.name} has a heat flux of its own, whose time is not known here. Give the wall U or "
-                f"an emissivity, or prescribe {self.heat_name} under `loading`."
-            )
-        rate = float(wall.heat_rate)
-        return -rate if wall.left_reactor is self.reservoir else rate

@@ -19,7 +19,7 @@ from surfacechem.expressions import depends
 from surfacechem.format import Case
 from surfacechem.mechanism.evaluated import HeldPhase
 from surfacechem.model.assemble import assemble
-from surfacechem.model.system import END_PATH, System
+from surfacechem.model.system import END_PATH
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import coupling
 from surfacechem.results.solution import Solution
@@ -28,7 +28,6 @@ from surfacechem.solve.contract import Array, Counters, Events, Problem, Result,
 from surfacechem.solve.diagnose import STALLED, no_number
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import Instant
-from surfacechem.solve.jumps import Jump
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import DEFAULT_RTOL, NEGLIGIBLE, SQRT_EPS, TINY
 
@@ -98,11 +97,6 @@ class InstantEvents:
         self.loads: Array | None = None
         """Parameters of the load segment that has just ended."""
 
-    @property
-    def jumps(self) -> list[Jump]:
-        """Jumps so far."""
-        return self.instant.jumps
-
     def until(self, goal: float, rtol: float) -> None:
         """Set the end of the next integration, relative to which times are brief, and the tolerance."""
         self.instant.end, self.instant.rtol = goal, GLOBAL_ERROR * rtol
@@ -132,24 +126,20 @@ class InstantEvents:
             left = np.where((now > 0) & (rates < 0), -now / rates, np.inf)
         return float(left.min(initial=np.inf))
 
-    def resolve(self) -> Array | None:
-        """Carry out the due edges at the state set last; return what they add to the ledger, None if the scene ends."""
+    def resolve(self, index: int | None) -> Array | None:
+        """Carry out an edge, if any is given, at the state set last, and all edges that are due then.
+
+        Return what they add to the ledger, None if the scene ends.
+        """
         before, here, loads = self.instant.ledger.copy(), self.here(), self.loads
         begun: Point | None = here
-        if loads is not None:
+        if index is not None:
+            begun = self.instant.apply(index, here)
+        elif loads is not None:
             histories = [parameter.load is not None for parameter in self.system.parameters]
             last = replace(here, parameters=np.where(histories, loads, here.parameters))
             begun, self.loads = self.instant.begin(here, last), None
-        return self._taken(self.instant.resolve(begun) if begun is not None else None, before)
-
-    def fire(self, index: int) -> Array | None:
-        """Carry out an edge at the state set last, and the edges that are due after it."""
-        before = self.instant.ledger.copy()
-        point = self.instant.apply(index, self.here())
-        return self._taken(self.instant.resolve(point) if point is not None else None, before)
-
-    def _taken(self, point: Point | None, before: Array) -> Array | None:
-        """Set the state to a point and return the additions to the ledger since ``before``."""
+        point = self.instant.resolve(begun) if begun is not None else None
         if point is None:
             return None
         self.evaluation.parameters[:] = point.parameters
@@ -159,15 +149,6 @@ class InstantEvents:
 
 class EndError(Exception):
     """The scene ends at a state, with the reason in words."""
-
-
-def _refuse_folds(system: System) -> None:
-    folds = [item.reason for item in system.edges if item.fold is not None]
-    if folds:
-        raise InputError(
-            f"the scene loses a quasi-static equilibrium ({folds[0]}), at which the gap is infinitely fast, so that an "
-            "integrator without our search cannot come near. Give the gap a damper or a mass, or run the case alone."
-        )
 
 
 def _combination(states: Array, accounts: Array) -> Array:
@@ -212,7 +193,13 @@ class EmbeddedScene:
             scene = coupling.with_loads(scene, {name: function(0.0) for name, function in loads.items()})
             scene = coupling.with_neighbours(scene, neighbours or {})
             system = assemble(scene).with_multipliers()
-            _refuse_folds(system)
+            for edge in system.edges:
+                if edge.fold is not None:
+                    raise InputError(
+                        f"the scene loses a quasi-static equilibrium ({edge.reason}), at which the gap is infinitely "
+                        "fast, so that an integrator without our search cannot come near. Give the gap a damper or a "
+                        "mass, or run the case alone."
+                    )
             self.places = {parameter.path: j for j, parameter in enumerate(system.parameters)}
             """Indices of the parameters, by path."""
             unread = [name for name, path in zip(loads, self.loads, strict=True) if path not in self.places]
@@ -223,6 +210,7 @@ class EmbeddedScene:
             self.values = self.model.values()
             self.problem = self.model.problem(Run(times=(0.0, NO_END)), self.values, passing=False)
         self.evaluation = Evaluation(self.problem.program, self.problem.y0, self.problem.parameters[0])
+        self._evaluations = Evaluations(self.problem.program, self.evaluation.parameters)
         self.events: InstantEvents | None = None
         self.begin_segment(0.0, DIFFERENCE_STEPS)
         self.events = InstantEvents(self.model, self.problem, self.evaluation) if self.model.jumper else None
@@ -272,12 +260,6 @@ class EmbeddedScene:
             raise InputError(message)
         return len(self.states) + self.accounts.index(wanted)
 
-    def edges_that_read(self, name: str) -> list[str]:
-        """Return the names of the edges whose guards depend on a load."""
-        system = self.model.system
-        symbol = next(item.symbol for item in system.parameters if item.path == f"loading.{name}.level")
-        return [edge.name for edge in system.edges if depends(system.expand(edge.guard), symbol)]
-
     def put(self, t: float, x: Array) -> bool:
         """Set time, variables and the loads of that time; return whether a consistent state was found."""
         self.set_loads(t)
@@ -300,17 +282,14 @@ class EmbeddedScene:
         if not self.put(t, x):
             odd = no_number(self.model.system, self.model.output_function(evaluation.inputs))
             raise EndError(odd or "no state satisfies the equations")
-        self._refuse_ended(evaluation.margins()[: len(self._terminal)])
+        margins = evaluation.margins()[: len(self._terminal)]
+        if len(margins) and not margins[margins.argmin()] >= 0:  # argmin finds NaN, if any
+            closed = self._terminal & ~(margins >= 0)
+            if closed.any():
+                closed &= self.model.system.active_guards(evaluation.parameters)[: len(closed)]
+            if closed.any():
+                raise EndError(self.model.margins[int(closed.argmax())].reason)
         return evaluation.rates()
-
-    def _refuse_ended(self, margins: Array) -> None:
-        if not len(margins) or margins[margins.argmin()] >= 0:  # argmin finds NaN, if any
-            return
-        closed = self._terminal & ~(margins >= 0)
-        if closed.any():
-            closed &= self.model.system.active_guards(self.evaluation.parameters)[: len(closed)]
-        if closed.any():
-            raise EndError(self.model.margins[int(closed.argmax())].reason)
 
     def closest(self, t: float, x: Array) -> str:
         """Return the reason for the end if the integrator cannot go on: that of the limit that came closest."""
@@ -371,10 +350,6 @@ class EmbeddedScene:
         _, ydot, ledger, _ = self._evaluations(times, y, parameters)
         return np.hstack((ydot[:, evaluation.free], ledger))
 
-    @cached_property
-    def _evaluations(self) -> Evaluations:
-        return Evaluations(self.problem.program, self.evaluation.parameters)
-
     def _sizes(self, x: Array) -> Array:
         """Return magnitudes of the states, or their scales if these are larger."""
         scales = np.array([state.size for state in self.model.system.states])
@@ -418,7 +393,7 @@ class EmbeddedScene:
         """
         assert self.events is not None
         self.put(t, x)
-        booked = self.events.resolve() if index is None else self.events.fire(index)
+        booked = self.events.resolve(index)
         if booked is None:
             raise EndError(self.events.instant.reason)
         states = self.evaluation.y[self.evaluation.free]
@@ -457,7 +432,7 @@ class History:
         status = "stopped" if stop else "finished"
         result = self._result(Status.EVENT if stop else Status.FINISHED)
         case, events = self.scene.case, self.scene.events
-        jumps = tuple(events.jumps) if events else ()
+        jumps = tuple(events.instant.jumps) if events else ()
         return Solution(
             Trajectory(self.scene.model, run, result, self.scene.values, status, reason, seconds, jumps),
             title=case.title,
@@ -468,7 +443,18 @@ class History:
         )
 
     def _result(self, status: Status) -> Result:
-        problem = self._problem()
+        base, times = self.scene.problem, np.array(self.times)
+        before = times[0] - max(1.0, abs(times[0]))
+        problem = Problem(
+            program=base.program,
+            y0=self.rows[0][0],
+            times=times,
+            segments=np.concatenate(([before], times)),  # up to each record one, with its parameters
+            parameters=np.array([row[3] for row in self.rows]),
+            rtol=self.rtol,
+            atol=base.atol,
+            margins=base.margins,
+        )
         y, ydot, ledger, _ = self.rows[-1]
         n, q = problem.program.n, problem.program.n_ledger
         none = Events(*(np.empty(shape) for shape in (0, (0, n), (0, n), (0, q))), index=np.empty(0, np.int64))
@@ -485,19 +471,4 @@ class History:
             ledger_outputs=np.array([row[2] for row in self.rows]),
             events=none,
             counters=self.counters,
-        )
-
-    def _problem(self) -> Problem:
-        """Return a problem with a load segment up to each record, with its parameters."""
-        base, times = self.scene.problem, np.array(self.times)
-        before = times[0] - max(1.0, abs(times[0]))
-        return Problem(
-            program=base.program,
-            y0=self.rows[0][0],
-            times=times,
-            segments=np.concatenate(([before], times)),
-            parameters=np.array([row[3] for row in self.rows]),
-            rtol=self.rtol,
-            atol=base.atol,
-            margins=base.margins,
         )

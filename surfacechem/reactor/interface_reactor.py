@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Self
@@ -17,6 +16,7 @@ from surfacechem import format as cases
 from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError, concise
+from surfacechem.expressions import depends
 from surfacechem.format import Case
 from surfacechem.reactor.coupling import BodyPort, HeatWall, Receiver, function_of, node_of, refuse, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError, History
@@ -77,7 +77,11 @@ class InterfaceReactor(StateVectorReactor):
         **_: Any,
     ) -> Self:
         """Read the scene: Cantera needs its reactions at creation."""
-        scene = EmbeddedScene(_case(case, overrides), bodies or {}, neighbours=neighbours)
+        if overrides and isinstance(case, Simulation | Case):
+            raise InputError("a case that is read already takes no overrides: give them to `surfacechem.load`.")
+        if not isinstance(case, Case):
+            case = case.case if isinstance(case, Simulation) else cases.load(case, overrides)
+        scene = EmbeddedScene(case, bodies or {}, neighbours=neighbours)
         made = super().__new__(cls, contents(scene.reactions or ("bond",)), name=name)
         made.scene = scene
         return made
@@ -120,11 +124,13 @@ class InterfaceReactor(StateVectorReactor):
         self._connecting = True
         for body, reactor in self.bodies.items():
             # Through the wall the reactor supplies the heat that keeps the body at its temperature.
-            self._walls.append(HeatWall(self, reactor, interface=self, A=self.area, Q=partial(self._supplied, body)))
+            heat = lambda t, body=body: -float(self._rates_for_others(t)[self._accounts[body]])  # noqa: E731
+            self._walls.append(HeatWall(self, reactor, interface=self, A=self.area, Q=heat))
         self._connecting = False
         for k, neighbour in enumerate(self.neighbours.values()):
             if isinstance(neighbour, Receiver):
-                neighbour.sources.append((self, partial(self._given, k)))
+                given = lambda t, k=k: self.scene.neighbours[k].given(self._rates_for_others(t), self.area)  # noqa: E731
+                neighbour.sources.append((self, given))
 
     def __repr__(self) -> str:
         """Return title and states in a line."""
@@ -166,14 +172,6 @@ class InterfaceReactor(StateVectorReactor):
         self._accounts = {body: scene.account(body) for body in self.bodies}
         """Indices of the variables that hold the heat of the bodies that reactors replace."""
         self.history = History(scene)
-
-    def _supplied(self, body: str, t: float) -> float:
-        """Return the heat [W/m^2] that the reactor in place of a body supplies at a time [s]."""
-        return -float(self._rates_for_others(t)[self._accounts[body]])
-
-    def _given(self, k: int, t: float) -> tuple[Array, float]:
-        """Return species [kmol/s] and enthalpy [W] that reactions give to a neighbour at a time [s]."""
-        return self.scene.neighbours[k].given(self._rates_for_others(t), self.area)
 
     def _add_wall(self, wall: Any) -> None:
         """Refuse a wall on this reactor, which consists of two bodies; Cantera calls it."""
@@ -308,11 +306,14 @@ class InterfaceReactor(StateVectorReactor):
             raise InputError("a reactor presses on a gap that has a rate of its own: give it a damper or a mass.")
         push = lambda _: gas.phase.P - outside.phase.P  # noqa: E731
         scene = self._loaded("F_n", push)
-        read = scene.edges_that_read("F_n")
-        if read:
-            raise InputError(
-                f"{read[0]} depends on the load of the gap, which a reactor gives at the ends of steps. Prescribe F_n."
-            )
+        system = scene.model.system
+        force = system.parameters[scene.places["loading.F_n.level"]].symbol
+        for edge in system.edges:
+            if depends(system.expand(edge.guard), force):
+                raise InputError(
+                    f"{edge.name} depends on the load of the gap, which a reactor gives at the ends of steps. "
+                    "Prescribe F_n."
+                )
         self._set_scene(scene)
         self.loads["F_n"], self.pressing = push, (gas, outside)
         gap = scene.states.index("g_n")
@@ -346,11 +347,9 @@ class InterfaceReactor(StateVectorReactor):
                 f"others have asked {self.name} for rates before Cantera has told it which of them it varies, so "
                 f"sensitivities would be wrong. Give {self.name} to the network before the reactors that take from it."
             )
-        if not self.passes_breakpoints:
-            self._check_segment(t)
         rates = np.asarray(self._rates(t) / self.unit)
         if not self.passes_breakpoints:
-            self._refuse_passed()
+            self._refuse_passed(t)
         self.evaluations += 1
         self.seconds += time.perf_counter() - began
         return rates
@@ -435,17 +434,14 @@ class InterfaceReactor(StateVectorReactor):
         for item in self.scene.neighbours:
             yield from item.places
 
-    def _check_segment(self, t: float) -> None:
-        breakpoints = self.scene.breakpoints
-        following = bisect_right(breakpoints, self.t)
-        if following < len(breakpoints) and t > breakpoints[following]:
+    def _refuse_passed(self, t: float) -> None:
+        """Refuse a time beyond a breakpoint, or a state beyond an edge, that no network has carried out."""
+        passed_times = [each for each in self.scene.breakpoints if self.t < each < t]
+        if passed_times:
             raise InputError(
-                f"the loading has a breakpoint at t = {breakpoints[following]:g} s, which an ordinary ReactorNet steps "
+                f"the loading has a breakpoint at t = {passed_times[0]:g} s, which an ordinary ReactorNet steps "
                 "over. Use surfacechem.reactor.ReactorNet."
             )
-
-    def _refuse_passed(self) -> None:
-        """Refuse a state beyond an edge that no network has carried out."""
         if self.scene.events is None:
             return
         edges = self.scene.model.system.edges
@@ -498,23 +494,20 @@ class InterfaceReactor(StateVectorReactor):
         """Carry out a transition at time t [s], or the due ones if None, and keep the new state."""
         try:
             self.x, booked = self.scene.moved(t, self.x, index)
-            self._refuse_sudden_heat(t)
+            jumps = self.scene.events.instant.jumps if self.scene.events else []
+            if self.bodies and any(jump.heat_out for jump in jumps if jump.t == t):
+                names = ", ".join(self.bodies)
+                raise InputError(
+                    f"the jump at t = {t:.9g} s gives heat at once to bodies without a capacity of their own, and "
+                    f"reactors stand for {names}: a reactor takes heat in time only. Give the body a heat capacity, "
+                    "and put a wall between it and the reactor."
+                )
             self.ledger, self.booked_at = self.ledger + booked, self.x
         except EndError as end:
             raise self._stopped(f"{end} at t = {t:.9g} s") from None
         self._last, self._last_inputs, self._current = None, None, False
         for port in self.ports.values():
             port.warm(float(self.x[self.scene.states.index(port.node)]))
-
-    def _refuse_sudden_heat(self, t: float) -> None:
-        jumps = self.scene.events.jumps if self.scene.events else []
-        if self.bodies and any(jump.heat_out for jump in jumps if jump.t == t):
-            names = ", ".join(self.bodies)
-            raise InputError(
-                f"the jump at t = {t:.9g} s gives heat at once to bodies without a capacity of their own, and reactors "
-                f"stand for {names}: a reactor takes heat in time only. Give the body a heat capacity, and put a wall "
-                "between it and the reactor."
-            )
 
     def end(self) -> None:
         """Return to the last state before the end of the scene, and record it."""
@@ -567,11 +560,3 @@ class InterfaceReactor(StateVectorReactor):
     def dataset(self) -> xarray.Dataset:
         """Dataset of the recorded history, with the variables and attributes of a run."""
         return self.history.solution(self.reason, self.seconds, alone=not self.coupled).dataset
-
-
-def _case(case: str | Path | Case | Simulation, overrides: Sequence[str] | Mapping[str, object]) -> Case:
-    if overrides and isinstance(case, Simulation | Case):
-        raise InputError("a case that is read already takes no overrides: give them to `surfacechem.load`.")
-    if isinstance(case, Simulation):
-        return case.case
-    return case if isinstance(case, Case) else cases.load(case, overrides)

@@ -21,9 +21,6 @@ from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing
 from surfacechem.solve.contract import Array, Counters, Guard
 
-STEPS_OF_A_RESIDUAL = 10
-"""Steps between two tests for a steady state, as in Cantera."""
-
 SETTINGS = (
     *("energy_enabled", "chemistry_enabled", "device_coefficient", "time_function", "pressure_function"),
     *("area", "heat_transfer_coeff", "emissivity", "expansion_rate_coeff", "heat_flux", "velocity"),
@@ -56,7 +53,12 @@ class ReactorNet(cantera.ReactorNet):
         for reactor, count in Counter(self.reactors).items():  # Cantera has taken them from the argument
             if count > 1:
                 raise InputError(f"{reactor.name} stands {count} times in the list of reactors: give it once.")
-        _number([reactor for reactor in self.reactors if isinstance(reactor, StateVectorReactor)])
+        names = Counter[str]()
+        for reactor in self.reactors:
+            if isinstance(reactor, StateVectorReactor):
+                names[reactor.name] += 1
+                if (count := names[reactor.name]) > 1:
+                    reactor.name = f"{reactor.name}_{count}"
 
     @property
     def interfaces(self) -> list[InterfaceReactor]:
@@ -207,7 +209,7 @@ class ReactorNet(cantera.ReactorNet):
             self._started = self.time
 
     def step(self) -> float:
-        """Take one step of the integrator, or go to the next breakpoint if a step could pass it.
+        """Take one step of the integrator, to its end or to the event or breakpoint in it.
 
         Returns
         -------
@@ -220,56 +222,18 @@ class ReactorNet(cantera.ReactorNet):
             Where a scene ends, with the reason.
         """
         self._begin_or_restart()
-        if self.interfaces:
-            return self._watched_step(self._breakpoints())
-        super().step()
-        self._arrive(self.time)
-        return float(self.time)
-
-    def advance_to_steady_state(  # type: ignore[override]  # its stub has overloads
-        self,
-        max_steps: int = 10000,
-        residual_threshold: float = 0.0,
-        atol: float = 0.0,
-        return_residuals: bool = False,
-    ) -> Array | None:
-        """Step to a steady state, like Cantera's method, through the events before it.
-
-        Parameters
-        ----------
-        max_steps
-            Groups of ten steps after which the search ends.
-        residual_threshold
-            Relative change in ten steps that counts as zero; ten times the tolerance of the network if zero.
-        atol
-            Addition to each variable's largest value, in its unit; that of the network if zero.
-        return_residuals
-            Whether the changes are returned.
-
-        Returns
-        -------
-        ndarray or None
-            The relative change of each group of steps, where asked for.
-
-        Raises
-        ------
-        cantera.CanteraError
-            Where no steady state was reached.
-        """
-        threshold, floor = residual_threshold or 10 * self.rtol, atol or self.atol
-        self.step()  # initializes the network, which has no state before
-        before = np.asarray(self.get_state())
-        largest, residuals = np.abs(before), []
-        for _ in range(max_steps):
-            for _ in range(STEPS_OF_A_RESIDUAL):
-                self.step()
-            now = np.asarray(self.get_state())
-            largest = np.maximum(largest, np.abs(now))
-            residuals.append(float(np.linalg.norm((now - before) / (largest + floor))) / np.sqrt(len(now)))
-            if residuals[-1] < threshold:
-                return np.array(residuals) if return_residuals else None
-            before = now
-        raise cantera.CanteraError(f"no steady state was reached in {max_steps * STEPS_OF_A_RESIDUAL} steps.")
+        if not self.interfaces:
+            super().step()
+            self._arrive(self.time)
+            return float(self.time)
+        watch, ahead = self._watch, min(self._breakpoints(), default=np.inf)
+        if self._is_reached(ahead):
+            return self._advance(ahead)
+        if self.time >= watch.known:
+            with self._guarded():
+                self._locate_event(min(ahead, self.time + ASSUMED_LENGTH))
+        event = watch.event
+        return self._advance(min(ahead, watch.known if event is None else event.t))
 
     def solve_steady(self, loglevel: int = 0) -> None:
         """Refuse if there are interfaces: surface sites are conserved, so that steady states are not isolated."""
@@ -278,17 +242,6 @@ class ReactorNet(cantera.ReactorNet):
                 "solve_steady does not know reacting surfaces, whose sites are conserved. Use advance_to_steady_state."
             )
         super().solve_steady(loglevel)
-
-    def _watched_step(self, following: Sequence[float]) -> float:
-        """Go to the end of the integrator's next step, or to the event or breakpoint in it."""
-        watch, ahead = self._watch, min(following, default=np.inf)
-        if self._is_reached(ahead):
-            return self._advance(ahead)
-        if self.time >= watch.known:
-            with self._guarded():
-                self._locate_event(min(ahead, self.time + ASSUMED_LENGTH))
-        event = watch.event
-        return self._advance(min(ahead, watch.known if event is None else event.t))
 
     def _begin_or_restart(self) -> None:
         """Begin, or restart if a script has changed anything."""
@@ -387,13 +340,3 @@ def _contents(reactor: Any) -> tuple[bytes, float, bytes]:
     phase = reactor.phase
     reacts = reactor.chemistry_enabled and getattr(phase, "n_reactions", 0)
     return phase.state.tobytes(), reactor.volume, phase.forward_rate_constants.tobytes() if reacts else b""
-
-
-def _number(reactors: Sequence[Any]) -> None:
-    """Number the names that occur more than once."""
-    counts = Counter[str]()
-    for reactor in reactors:
-        name = reactor.name
-        counts[name] += 1
-        if counts[name] > 1:
-            reactor.name = f"{name}_{counts[name]}"

@@ -7,9 +7,9 @@ advances there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -136,7 +136,7 @@ class StepWatcher:
         for item, before in zip(self.interfaces, self._before, strict=True):
             if not len(before):
                 continue
-            guards = Guards.of([Guard.stop()] * len(before), self._guards_of(item))
+            guards = Guards.of([Guard.stop()] * len(before), partial(self._guards, item))
             guards.start(before)
             present = guards.values(now, step.y(now))
             t, fired = now, np.flatnonzero(guards.crossed(present)).tolist()
@@ -148,15 +148,11 @@ class StepWatcher:
         if self._halves and self._is_coupled:  # the guards have displaced the reactors
             self.go(now)
 
-    def _guards_of(self, item: InterfaceReactor) -> Callable[[float, Array], Array]:
-        """Return the guards of an interface as a function of time and the variables of the network."""
-
-        def guards(t: float, y: Array) -> Array:
-            if self._is_coupled and self._is_ours:
-                self._put(t, y)
-            return item.scene.transitions(t, y[self._columns[item]] * item.unit)
-
-        return guards
+    def _guards(self, item: InterfaceReactor, t: float, y: Array) -> Array:
+        """Return the guards of an interface at a time and the variables of the network."""
+        if self._is_coupled and self._is_ours:
+            self._put(t, y)
+        return item.scene.transitions(t, y[self._columns[item]] * item.unit)
 
     def _put(self, t: float, y: Array) -> None:
         """Set the reactors to a time and the variables of the network then."""
