@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import math
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -108,7 +108,13 @@ def _problem(phase: Any, state: Neighbour) -> str:
         return f"the mole fraction of {state.rest} in the neighbour {name} has two roles: give it, or `rest`."
     if state.pressure is not None and not state.pressure.at_start() > 0:
         return f"the pressure of the neighbour {name} is {state.pressure.at_start():g} Pa, not above zero."
-    return uneven(name, {species: load.at_start() for species, load in state.composition.items()}, bool(state.rest))
+    parts = {species: load.at_start() for species, load in state.composition.items()}
+    for species, part in parts.items():
+        if not 0 <= part <= 1:
+            return f"the mole fraction {species} = {part:g} in the neighbour {name} is outside its range: 0 to 1."
+    total = sum(parts.values())
+    wrong = total > 1 + SUM_TOLERANCE if state.rest else parts and abs(total - 1) > SUM_TOLERANCE
+    return f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1." if wrong else ""
 
 
 def _misheld(name: str, state: Neighbour) -> str:
@@ -123,16 +129,6 @@ def _misheld(name: str, state: Neighbour) -> str:
             "of the start. Remove `capacitance` where the potential is prescribed."
         )
     return ""
-
-
-def uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
-    """Return the error of mole fractions, all or all but a ``rest``, in words; empty if there is none."""
-    for species, part in parts.items():
-        if not 0 <= part <= 1:
-            return f"the mole fraction {species} = {part:g} in the neighbour {name} is outside its range: 0 to 1."
-    total = sum(parts.values())
-    wrong = total > 1 + SUM_TOLERANCE if rest else parts and abs(total - 1) > SUM_TOLERANCE
-    return f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1." if wrong else ""
 
 
 class HeldPhase:
@@ -207,11 +203,6 @@ class HeldPhase:
             text = f"the mole fractions of {name} no longer add up to one; let one species be its `rest`"
             yield f"sum in {name} = 1", SUM_TOLERANCE - absolute(symengine.Add(*parts) - 1), text
 
-    def charged(self, names: Iterable[str]) -> dict[str, float]:
-        """Return the charge [C] per molecule of each charged species of this phase among ``names``."""
-        charges = dict(zip(self.phase.species_names, self.phase.charges.tolist(), strict=True))
-        return {name: ELEMENTARY_CHARGE * charges[name] for name in names if charges.get(name)}
-
     def energies(self, both: Array) -> None:
         """Set partial molar enthalpies and Gibbs energies of the species [J/kmol], including their electric energy."""
         both[0] = self.enthalpies = self.phase.partial_molar_enthalpies
@@ -283,12 +274,6 @@ class NeighbourReaction(EvaluatedReaction):
         return Formula((), lambda _: self.enthalpy), Formula((), lambda _: self.gibbs)
 
 
-def amounts_taken(surface: Any, phases: Sequence[Any]) -> Any:
-    """Return the amount of each species of these phases that each reaction takes, shape (reactions, species)."""
-    rows = [index for phase in phases for index in indices(surface, phase)]
-    return np.asarray(surface.reactant_stoich_coeffs - surface.product_stoich_coeffs)[rows].T
-
-
 class SurfaceEngine:
     """A Cantera surface that evaluates the net rates of some of its reactions, and what they take from neighbours.
 
@@ -316,7 +301,10 @@ class SurfaceEngine:
         first, own = species[0], [item.variable for item in species]
         self._own = "T_c", first.concentration, *own
         self._sites, self._count = first.sites, len(own)
-        self._taken = amounts_taken(surface, [held.phase for held in self.held])[open_ones].T / MOLECULAR
+        rows = [index for held in self.held for index in indices(surface, held.phase)]
+        taken = surface.reactant_stoich_coeffs - surface.product_stoich_coeffs
+        self._taken = np.asarray(taken)[rows][:, open_ones] / MOLECULAR
+        """Amount of each of their species that each of these reactions takes."""
         self._energies = np.empty(0)
         self._lay_out()
         self._brought: list[tuple[object, ...]] = [()]
@@ -362,7 +350,12 @@ class SurfaceEngine:
     @property
     def charges(self) -> dict[str, dict[str, float]]:
         """Charge [C] per molecule of each charged species that reactions produce in neighbours, by phase."""
-        return {word(held.phase.name): held.charged(self.made_in(held.phase)) for held in self.held}
+        found: dict[str, dict[str, float]] = {}
+        for phase in (held.phase for held in self.held):
+            charges = dict(zip(phase.species_names, phase.charges.tolist(), strict=True))
+            made = (name for name in self.made_in(phase) if charges[name])
+            found[word(phase.name)] = {name: ELEMENTARY_CHARGE * charges[name] for name in made}
+        return found
 
     def made_in(self, phase: Any) -> dict[str, str]:
         """Return the ``names`` of species of this neighbour; an ambiguous name refers to the first such species."""

@@ -225,6 +225,8 @@ class PhaseCheck:
 
     def _all_species(self, entries: list[Any]) -> None:
         """Check every species; neighbours' species are left to Cantera, unless they lack a name, perhaps by a typo."""
+        import cantera
+
         there = [str(entry.get("name")) for entry in entries]
         self.names = chosen(self.phase.get("species", "all"), there)
         own = [entry for entry in entries if entry.get("name") in self.names]
@@ -233,21 +235,14 @@ class PhaseCheck:
                 self._species(entry)
         place = self.source.place(self.phase, "species")
         refuse_unknown(self.names, there, "species: no species '{}'", place)
-        self._composition(own if self.has_neighbours else entries)
-        for entry in own:
-            self._dependence(entry)
-
-    def _composition(self, entries: list[Any]) -> None:
-        """Check that elements are declared by the phase, else that they exist."""
-        import cantera
-
+        # Elements are declared by the phase, or exist; the nearest of all existing ones would be a poor suggestion.
         declared = [str(element.get("symbol")) for element in self.source.data.get("elements") or []]
         elements = self.phase.get("elements", [*cantera.Element.element_symbols, "E", *declared])
-        for entry in entries:
-            composition = entry.get("composition") or {}
+        for entry in own if self.has_neighbours else entries:
             title = f"species {entry.get('name')}: composition: no element"
-            # The nearest of all existing elements would be a poor suggestion.
-            self._among(composition, elements, title, hint="elements" in self.phase)
+            self._among(entry.get("composition"), elements, title, hint="elements" in self.phase)
+        for entry in own:
+            self._dependence(entry)
 
     def _species(self, entry: Any) -> None:
         source, title = self.source, f"species {entry.get('name')}"
@@ -329,10 +324,6 @@ class PhaseCheck:
         self._inside(entry, law.keys, known, title)
         if known:
             self._among(entry.get("orders"), known, f"{title}: orders: no species")
-        self._arrhenius(entry, title)
-
-    def _arrhenius(self, entry: Any, title: str) -> None:
-        error = self.source.error
         rate = entry.get("rate-constant")
         if not isinstance(rate, Mapping):
             raise error(f"{title} has no `rate-constant: {{A, b, Ea}}`.", entry)

@@ -160,20 +160,18 @@ def _loaded(
         temperatures=engine.temperatures,
         engine=engine if engine.gives else None,
         remarks=(*said, *odd),
-        follows_from_text=not engine.gives and _is_whole(source, entry) and all(map(_is_shipped, reactions)),
+        follows_from_text=not engine.gives and _is_whole(source, entry, reactions),
     )
 
 
-def _is_whole(source: Source, phase: Any) -> bool:
-    """True if the phase refers to no other phase or file, which Cantera would read, and to no extension."""
+def _is_whole(source: Source, phase: Any, reactions: Sequence[RateLaw]) -> bool:
+    """True if the phase refers to no other phase, file or extension, and all its laws are stated in this package."""
     declared = [phase.get(key) for key in ("species", "reactions", "elements")]
     # Cantera takes what is before a slash for the name of a file.
-    return not (phase.get("adjacent-phases") or source.data.get("extensions") or "/" in str(declared))
-
-
-def _is_shipped(law: RateLaw) -> bool:
-    """True if the law is stated in this package; rate types follow from the laws that state them."""
-    return str(getattr(law, "law", type(law)).__module__).startswith(f"{PACKAGE.name}.")
+    if phase.get("adjacent-phases") or source.data.get("extensions") or "/" in str(declared):
+        return False
+    stated = (getattr(law, "law", type(law)) for law in reactions)  # rate types follow from laws
+    return all(law.__module__.startswith(f"{PACKAGE.name}.") for law in stated)
 
 
 def find(name: str, folder: Path, place: Place) -> Path:
@@ -312,14 +310,9 @@ def _reaction(
         message = f"{title}: {elastic[0]} is elastic, which Cantera's equilibrium constant does not know. "
         raise InputError(f"{message}Write two one-way reactions.", place)
     given |= {"whole": whole, "value": 0.0}
-    if beside := _outside(whole, variables):
+    if beside := {name: nu for name, nu in whole.items() if name not in variables}:
         return NeighbourReaction(enthalpy=0.0, gibbs=0.0, in_neighbours=beside, **given)
     return EvaluatedReaction(**given)
-
-
-def _outside(whole: Mapping[str, float], own: Mapping[str, str]) -> dict[str, float]:
-    """Return the part of a change that belongs to other phases."""
-    return {name: nu for name, nu in whole.items() if name not in own}
 
 
 def _lowered(

@@ -491,7 +491,7 @@ def test_reactors_from_a_generator():
     net = ReactorNet(InterfaceReactor(case) for case in ("stick-slip", "exothermic"))
     net.advance(0.7)
     assert [each.name for each in net.interfaces] == ["interface", "interface_2"]
-    assert len(net.interfaces[0].scene.events.jumps) == 2
+    assert len(net.interfaces[0].scene.events.instant.jumps) == 2
 
 
 @pytest.mark.parametrize("kind", [ReactorNet, ct.ReactorNet])

@@ -24,7 +24,7 @@ def network(case, **bodies) -> tuple[InterfaceReactor, ReactorNet]:
 
 
 def compare(interface, solution, within):
-    ours, theirs = interface.scene.events.jumps, solution.trajectory.jumps
+    ours, theirs = interface.scene.events.instant.jumps, solution.trajectory.jumps
     assert [jump.edge.name for jump in ours] == [jump.edge.name for jump in theirs]
     end = solution.trajectory.run.times[-1]
     np.testing.assert_allclose([j.t for j in ours], [j.t for j in theirs], atol=within * end, rtol=0)
@@ -97,7 +97,7 @@ def test_endless_rebounds_end_in_a_network_too():
     """It does not follow as many of them as the compiled path."""
     interface, net = network("bouncing-plate", overrides=["mechanics.normal.e=0.1"])
     net.advance(1.0)
-    jumps = interface.scene.events.jumps
+    jumps = interface.scene.events.instant.jumps
     assert [jump.edge.name for jump in jumps] == (len(jumps) - 1) * ["impact"] + ["rest"]
     fall = (2 * 1.0 / 9.81) ** 0.5
     assert jumps[-1].t == pytest.approx(fall * (1 + 2 * 0.1 / (1 - 0.1)), rel=1e-6)
@@ -109,8 +109,8 @@ def test_single_steps_end_at_the_event():
     times = []
     while net.time < 0.7:
         times.append(net.step())
-    assert [jump.edge.name for jump in interface.scene.events.jumps][:2] == ["slip forward", "stop"]
-    for jump in interface.scene.events.jumps:
+    assert [jump.edge.name for jump in interface.scene.events.instant.jumps][:2] == ["slip forward", "stop"]
+    for jump in interface.scene.events.instant.jumps:
         assert min(abs(t - jump.t) for t in times) < 1e-15
     assert all(later > before for before, later in pairwise(times))
 

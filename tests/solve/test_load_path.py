@@ -263,7 +263,7 @@ def test_loads_jump_in_a_reactor_network(loading):
     net = ReactorNet([interface])
     net.rtol, net.atol = 1e-10, 1e-16
     net.advance(6.0)
-    ours, theirs = interface.scene.events.jumps, solution.trajectory.jumps
+    ours, theirs = interface.scene.events.instant.jumps, solution.trajectory.jumps
     assert [jump.edge.name for jump in ours] == [jump.edge.name for jump in theirs]
     assert [jump.released for jump in ours] == pytest.approx([jump.released for jump in theirs], abs=1e-6)
     assert interface["u_t"] == pytest.approx(at(solution, "u_t", 6.0), rel=1e-9)
