@@ -403,14 +403,13 @@ def evaluate(
 def equations(
     case: CaseName,
     form: Annotated[
-        str, Option("--format", help="python, which runs; latex, the same; text, to read: without guards, by mode.")
+        str, Option("--format", help="python, which runs; latex or text, to read: without guards, by mode.")
     ] = "python",
     changes: Changes = None,
 ) -> None:
     """Print the equations of a case, as Python that runs, as LaTeX, or as text."""
     refuse_unknown([form], ("python", "latex", "text"), "no format '{}'", Place(path="--format"))
     from surfacechem import format as cases
-    from surfacechem.compile import printing
     from surfacechem.results import spatial
 
     read = cases.load(case, changes or ())
@@ -422,8 +421,14 @@ def equations(
         from surfacechem.studies.run_report import equation_sheet
 
         show(equation_sheet(read.system(), title))
+    elif form == "latex":
+        from surfacechem.compile.typeset import latex
+
+        typer.echo(latex(read.system(), title), nl=False)
     else:
-        typer.echo(getattr(printing, form)(read.system(), title), nl=False)
+        from surfacechem.compile.printing import python
+
+        typer.echo(python(read.system(), title), nl=False)
 
 
 @app.command(epilog=EXIT_CODES)

@@ -1,6 +1,6 @@
-r"""The equations of an assembled scene as readable, executable Python, and as LaTeX.
+"""The equations of an assembled scene as readable, executable Python.
 
-The Python form is a module of functions with the signature of the compiled ones: ``residual``, ``jacobian``,
+It is a module of functions with the signature of the compiled ones: ``residual``, ``jacobian``,
 ``outputs``, ``ledger`` and ``margins`` of (t, y, ydot, parameters). It is the debug mode: where the compiled code
 returns NaN, this one raises at the line of the quantity concerned. If a history consists of pieces, each is printed
 with its start, and the functions use the piece in which t lies unless ``parameters`` are passed.
@@ -19,14 +19,13 @@ from typing import Any
 import symengine
 import sympy  # type: ignore[import-untyped]
 from sympy.core.parameters import distribute  # type: ignore[import-untyped]
-from sympy.printing.latex import LatexPrinter  # type: ignore[import-untyped]
 from sympy.printing.printer import Printer  # type: ignore[import-untyped]
 from sympy.printing.pycode import PythonCodePrinter  # type: ignore[import-untyped]
 
 from surfacechem.compile.program import jacobian, needed
 from surfacechem.expressions import Expression
 from surfacechem.model.system import Named, Parameter, System
-from surfacechem.quantities import VARIABLES, Quantity, spelled
+from surfacechem.quantities import Quantity
 
 CODE_WIDTH = 100
 """Width of printed lines; longer ones are broken where an expression permits."""
@@ -57,7 +56,7 @@ def sympy_form(expression: Expression) -> Any:
         return symengine.sympify(expression)._sympy_()
 
 
-class _Printer(Printer):  # type: ignore[misc]
+class TermPrinter(Printer):  # type: ignore[misc]
     """A SymPy printer that prints piecewise terms inside conditions separately, in the places of their symbols."""
 
     _terms: Mapping[str, Any] = {}
@@ -74,7 +73,7 @@ class _Printer(Printer):  # type: ignore[misc]
             self._terms = around
 
 
-class _Python(_Printer, PythonCodePrinter):  # type: ignore[misc]
+class _Python(TermPrinter, PythonCodePrinter):  # type: ignore[misc]
     def __init__(self) -> None:
         super().__init__({"fully_qualified_modules": True})
         self.reserved_words: set[str] = {*PythonCodePrinter.reserved_words, "math", "ydot", "parameters"}
@@ -98,7 +97,7 @@ def python(system: System, title: str = "") -> str:
         for name, (text, rows) in _functions(system).items()
     ]
     functions += [_jacobian(system, printer)] if system.rows else []
-    lines = [f"    {float(p.at(0.0))!r},  # {p.symbol} {_parameter_text(p)}" for p in system.parameters]
+    lines = [f"    {float(p.at(0.0))!r},  # {p.symbol} {parameter_text(p)}" for p in system.parameters]
     parameters = "\n".join(["PARAMETERS = (", *lines, ")\n"])
     states = "\n".join(
         f"    {state.name} [{state.quantity.unit}] {state.quantity.long_name}"
@@ -108,7 +107,7 @@ def python(system: System, title: str = "") -> str:
     heading = f"{title}: {system.regime}" if title else system.regime
     evolving = f"y holds\n\n{states}\n\nand ydot their time derivatives."
     held = evolving if states else "Nothing evolves: y and ydot are empty."
-    text = f"{_safe(heading)}.\n\nt is time [s]. {held}"
+    text = f"{safe(heading)}.\n\nt is time [s]. {held}"
     return "\n\n".join([f'"""{text}\n"""\n\nimport math\n', parameters, *_pieces(system), *functions])
 
 
@@ -183,8 +182,9 @@ def parameters_at(t):
 '''
 
 
-def _parameter_text(parameter: Parameter) -> str:
-    return _safe(f"[{parameter.spec.unit}] {parameter.spec.text} ({parameter.path})")
+def parameter_text(parameter: Parameter) -> str:
+    """Return unit, meaning and path of a parameter."""
+    return safe(f"[{parameter.spec.unit}] {parameter.spec.text} ({parameter.path})")
 
 
 def _jacobian(system: System, printer: _Python) -> str:
@@ -234,11 +234,11 @@ def quantities_read(named: Sequence[Named], expressions: Iterable[Expression]) -
 
 
 def _described(quantity: Quantity) -> str:
-    return _safe(f"{quantity.long_name} [{quantity.unit}]" + (f", {quantity.tag}" if quantity.tag else ""))
+    return safe(f"{quantity.long_name} [{quantity.unit}]" + (f", {quantity.tag}" if quantity.tag else ""))
 
 
-def _safe(text: str) -> str:
-    """Return text that ends neither a comment nor a docstring."""
+def safe(text: str) -> str:
+    """Return text in one line that ends neither a comment nor a docstring."""
     return " ".join(text.split()).replace("\\", "/").replace('"""', "'''")
 
 
@@ -265,74 +265,3 @@ def _broken_line(before: str, text: str, after: str) -> list[str]:
         else:
             lines.append(piece)
     return [before, *(f"        {line}" for line in lines), f"    {after}"]
-
-
-# -- LaTeX ------------------------------------------------------------------------------------------------------------
-
-
-class Latex(_Printer, LatexPrinter):  # type: ignore[misc]
-    """LaTeX printer with the symbols of the package."""
-
-    def _print_Float(self, expression: Any) -> str:
-        mantissa, _, power = f"{float(expression)!r}".partition("e")
-        number = mantissa.removesuffix(".0")
-        if not power:
-            return number
-        return (f"{number} \\cdot " if number != "1" else "") + f"10^{{{int(power)}}}"
-
-    def _print_Symbol(self, expression: Any, style: str = "plain") -> str:
-        term = self._terms.get(str(expression))
-        return symbol(str(expression)) if term is None else rf"\left({self.text(term)}\right)"
-
-
-def symbol(name: str) -> str:
-    r"""Return the LaTeX of a name.
-
-    >>> symbol("phi_max"), symbol("dT_dt"), symbol("q_1"), symbol("R_linear_affinity")
-    ('\\phi_{\\mathrm{max}}', '\\dot{T}', 'q_{1}', 'R_{\\mathrm{linear\\,affinity}}')
-    """
-    rate = re.fullmatch(r"d(\w+)_dt", name)
-    if rate:
-        return rf"\dot{{{symbol(rate[1])}}}"
-    if name in VARIABLES and VARIABLES[name].latex:
-        return VARIABLES[name].latex
-    return spelled(name)
-
-
-def unit(text: str) -> str:
-    r"""Return the LaTeX of a unit.
-
-    >>> unit("W/(m^2 K)")
-    '\\mathrm{W/(m^{2}\\,K)}'
-    """
-    return r"\mathrm{" + re.sub(r"\^(-?\d+)", r"^{\1}", text).replace(" ", r"\,") + "}"
-
-
-def latex(system: System, title: str = "") -> str:
-    """Return the equations as a LaTeX align environment, with the values of the parameters as comments."""
-    printer = Latex({"mul_symbol": r"\,", "fold_short_frac": False})
-    heading = f"{title}: {system.regime}" if title else system.regime
-    values = [f"%   {p.symbol} = {float(p.at(0.0))!r} {_parameter_text(p)}" for p in system.parameters]
-    names = [str(system.parameters[j].symbol) for j in changing(system)]
-    for start, numbers in pieces(system)[1:]:
-        then = ", ".join(f"{name} = {number!r}" for name, number in zip(names, numbers, strict=True))
-        values.append(f"%   from {start!r} s on: {then}")
-    wanted = quantities_read(system.named, system.rows.values())
-    others = [item for item in system.outputs if item not in wanted]
-    lines = [_latex_row(printer, symbol(i.name), i.expression, i.quantity.long_name, i.quantity.unit) for i in wanted]
-    lines += [_latex_row(printer, "0", row, f"balance of {name}", "") for name, row in system.rows.items()]
-    lines += [_latex_row(printer, symbol(i.name), i.expression, i.quantity.long_name, i.quantity.unit) for i in others]
-    lines += [
-        _latex_row(printer, "0", row.expression, row.text, "").replace("&=", "&<", 1)
-        for row in _functions(system).get("margins", ("", []))[1]
-    ]
-    body = " \\\\\n".join(lines)
-    return "\n".join([f"% {_safe(heading)}", *values, r"\begin{align*}", body, r"\end{align*}", ""])
-
-
-LATEX_ESCAPES: Mapping[int, str] = {ord(c): f"\\{c}" for c in "_%&#$"}
-
-
-def _latex_row(printer: Latex, left: str, right: Expression, text: str, in_unit: str) -> str:
-    note = text.translate(LATEX_ESCAPES) + (f" $[{unit(in_unit)}]$" if in_unit else "")
-    return rf"  {left} &= {printer.text(right)} && \text{{{note}}}"

@@ -21,12 +21,22 @@ from typing import Any, NamedTuple
 
 import symengine
 import sympy  # type: ignore[import-untyped]
+from sympy.printing.latex import LatexPrinter  # type: ignore[import-untyped]
 
-from surfacechem.compile.printing import LATEX_ESCAPES, RELATIONS, Latex, quantities_read, symbol, sympy_form
+from surfacechem.compile.printing import (
+    RELATIONS,
+    TermPrinter,
+    changing,
+    parameter_text,
+    pieces,
+    quantities_read,
+    safe,
+    sympy_form,
+)
 from surfacechem.contracts.units import ELECTRON_VOLT
 from surfacechem.expressions import EXPONENT_CAP, LARGE_EXPONENT, LITERAL, Expression, derivative
 from surfacechem.model.system import Named, System
-from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEFAN_BOLTZMANN
+from surfacechem.quantities import AVOGADRO, BOLTZMANN, GAPS, GAS_CONSTANT, STEFAN_BOLTZMANN, VARIABLES, spelled
 from surfacechem.tolerances import EQUAL, FRACTION_FLOOR, LEAST_BONDED, LEAST_COVERAGE, REPULSION_WALL, TIME_EPS, TINY
 
 EXPONENT_CAPS = (EXPONENT_CAP, LARGE_EXPONENT, LITERAL, -30.0)
@@ -76,6 +86,8 @@ TABLE_PREFIX = "table over "
 
 HALF = symengine.Rational(1, 2)
 
+LATEX_ESCAPES: Mapping[int, str] = {ord(c): f"\\{c}" for c in "_%&#$"}
+
 GOLDEN_RATIO = 0.6180339887
 """Its multiples modulo one fill an interval evenly."""
 
@@ -110,6 +122,23 @@ def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
     symbols = {p.path: printer.text(p.symbol) for p in system.parameters}
     symbols |= {s.path: printer.text(symengine.Symbol(s.at_start[0].name)) for s in reversed(system.states)}
     return [printer.equation(line) for line in statements(system)], symbols
+
+
+def latex(system: System, title: str = "") -> str:
+    """Return the equations as a LaTeX align environment, with the values of the parameters as comments."""
+    lines, symbols = equations(system)
+    values = [f"%   {symbols[p.path]} = {float(p.at(0.0))!r} {parameter_text(p)}" for p in system.parameters]
+    names = [symbols[system.parameters[j].path] for j in changing(system)]
+    for start, numbers in pieces(system)[1:]:
+        then = ", ".join(f"{name} = {number!r}" for name, number in zip(names, numbers, strict=True))
+        values.append(f"%   from {start!r} s on: {then}")
+    rows = []
+    for line in lines:
+        equation = " ".join((line.left, *line.pieces)).replace("= ", "&= ", 1)
+        note = "; ".join(filter(None, (line.text, line.when))).translate(LATEX_ESCAPES).replace("^", r"\^{}")
+        rows.append(rf"  {equation} && \text{{{note}}}")
+    heading = safe(f"{title}: {system.regime}" if title else system.regime)
+    return "\n".join([f"% {heading}", *values, r"\begin{align*}", " \\\\\n".join(rows), r"\end{align*}", ""])
 
 
 def statements(system: System) -> list[Statement]:
@@ -162,6 +191,20 @@ def _names(system: System) -> dict[str, str]:
             index = rf"\mathrm{{{species.translate(LATEX_ESCAPES)}}}"
             names |= {state.name: rf"\theta_{{{index}}}", f"N_{state.name}": f"N_{{{index}}}"}
     return names
+
+
+def symbol(name: str) -> str:
+    r"""Return the LaTeX of a name.
+
+    >>> symbol("phi_max"), symbol("dT_dt"), symbol("q_1"), symbol("R_linear_affinity")
+    ('\\phi_{\\mathrm{max}}', '\\dot{T}', 'q_{1}', 'R_{\\mathrm{linear\\,affinity}}')
+    """
+    rate = re.fullmatch(r"d(\w+)_dt", name)
+    if rate:
+        return rf"\dot{{{symbol(rate[1])}}}"
+    if name in VARIABLES and VARIABLES[name].latex:
+        return VARIABLES[name].latex
+    return spelled(name)
 
 
 # -- without guards ---------------------------------------------------------------------------------------------------
@@ -318,7 +361,7 @@ def _shortest(expression: Expression) -> Expression:
     return symengine.sympify(min(forms, key=sympy.count_ops))
 
 
-class PaperPrinter(Latex):
+class PaperPrinter(TermPrinter, LatexPrinter):  # type: ignore[misc]
     """A printer of formulas for readers: few digits, positive terms first, functions by their usual names."""
 
     def __init__(self, names: Mapping[str, str]) -> None:
@@ -371,7 +414,9 @@ class PaperPrinter(Latex):
             return self._rate(self.names.get(rate[1]) or symbol(rate[1]))
         if name.startswith(TABLE_PREFIX):
             return rf"\mathcal{{F}}\left({symbol(name.removeprefix(TABLE_PREFIX))}\right)"
-        latex = self.names.get(name) or str(super()._print_Symbol(expression, style))
+        if name in self._terms:
+            return rf"\left({self.text(self._terms[name])}\right)"
+        latex = self.names.get(name) or symbol(name)
         return rf"\left({latex}\right)" if " / " in latex else latex
 
     def _rate(self, latex: str) -> str:
@@ -389,7 +434,11 @@ class PaperPrinter(Latex):
         return plain if exp is None else f"{plain}^{{{exp}}}"
 
     def _print_Float(self, expression: Any) -> str:
-        return str(super()._print_Float(sympy.Float(f"{float(expression):.4g}")))
+        mantissa, _, power = f"{float(f'{float(expression):.4g}')!r}".partition("e")
+        number = mantissa.removesuffix(".0")
+        if not power:
+            return number
+        return (f"{number} \\cdot " if number != "1" else "") + f"10^{{{int(power)}}}"
 
     def _print_exp(self, expression: Any, exp: Any = None) -> str:
         inside = self._print(expression.args[0])

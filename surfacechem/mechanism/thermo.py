@@ -188,6 +188,11 @@ class StandardGibbs:
         several = len(self.pieces) > 1
         return {f"range_{k}" if several else "": piece.form for k, piece in enumerate(self.pieces, start=1)}
 
+    def with_forms(self, forms: Sequence[GibbsForm]) -> StandardGibbs:
+        """Return a copy with other forms in its ranges."""
+        pairs = zip(self.pieces, forms, strict=True)
+        return replace(self, pieces=tuple(replace(piece, form=form) for piece, form in pairs))
+
 
 TWO_RANGES: Mapping[str, tuple[type[Series], int, int]] = {"NasaPoly2": (Nasa7, 8, 1), "ShomatePoly2": (Shomate, 1, 8)}
 """Cantera's models with two ranges: the form, and the first coefficient of the lower and of the upper range."""
@@ -444,8 +449,7 @@ class Species:
         spring = bind(self.spring, self.path, end) if self.spring else None
         paths = [(form, ".".join(filter(None, (self.path, key))), key) for key, form in self.gibbs.ranges.items()]
         forms = [bind(form, path, f"{end}_{key}" if key else end) for form, path, key in paths]
-        pieces = tuple(replace(piece, form=form) for piece, form in zip(self.gibbs.pieces, forms, strict=True))
-        return replace(self, gibbs=replace(self.gibbs, pieces=pieces), spring=spring)
+        return replace(self, gibbs=self.gibbs.with_forms(forms), spring=spring)
 
     @property
     def amount(self) -> str:
