@@ -262,16 +262,19 @@ class Program:
 
     def derivatives(self, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return dG/dy and dG/dydot as matrices [..., equation, variable]."""
-        values, core = self.jacobian(inputs), self.chains[0].first if self.chains else self.n
-        if len(self.nonzeros):
-            found = values
-            values = np.zeros((*found.shape[:-1], 2 * (core * (core + len(self.chains)) + 3 * (self.n - core))))
-            values[..., self.nonzeros] = found
-        if not self.chains:
-            both = values.reshape(*values.shape[:-1], 2, self.n, self.n)
-        else:
-            both = _scattered(values, self.n, self.chains)
-        return both[..., 0, :, :], both[..., 1, :, :]
+        found = self.jacobian(inputs)
+        both = np.zeros((*found.shape[:-1], self.n, 2 * self.n))
+        computed, equation, variable = self._places
+        both[..., equation, variable] = found[..., computed]
+        return both[..., : self.n], both[..., self.n :]
+
+    @cached_property
+    def _places(self) -> NDArray[np.int64]:
+        """Number among the computed derivatives, equation and variable of each."""
+        every = [*_derivatives(self.n, self.chains)]
+        computed = [every[k] for k in self.nonzeros.tolist()] if len(self.nonzeros) else every
+        there = [(k, i, j) for k, (i, j) in enumerate(computed) if j >= 0]
+        return np.array(there, np.int64).reshape(-1, 3).T
 
     @cached_property
     def algebraic_mask(self) -> NDArray[np.bool_]:
@@ -280,20 +283,6 @@ class Program:
     @property
     def n_inputs(self) -> int:
         return 1 + 2 * self.n + self.n_parameters
-
-
-def _scattered(values: NDArray[np.float64], n: int, chains: Sequence[Chain]) -> NDArray[np.float64]:
-    """Return both matrices from the results of a compiled Jacobian."""
-    core = chains[0].first
-    both = np.zeros((*values.shape[:-1], 2, n, n))
-    own, linked = np.split(values, [2 * core * core], axis=-1)
-    both[..., :core, :core] = own.reshape(*values.shape[:-1], 2, core, core)
-    places = np.array(list(_linked(core, chains)), dtype=np.int64)
-    for part in np.split(np.arange(len(places)), [core * len(chains)]):
-        entries, linked = np.split(linked, [2 * len(part)], axis=-1)
-        i, j = places[part].T
-        both[..., i[j >= 0], j[j >= 0]] = entries.reshape(*values.shape[:-1], 2, len(part))[..., j >= 0]
-    return both
 
 
 def compile_function(
@@ -690,7 +679,10 @@ def _compiled_lanes(
     known = list(zip(derivatives, rates, strict=True))
     others = [expanded(named, rows) for rows in others]
     ledger, margins = (expanded(known, rows) for rows in others)
-    slopes = _lane_slopes(rates, inputs) if implicit else []
+    slopes: list[Any] = []
+    if implicit:  # of rates by states, row-major, and last by time
+        rows, zero = jacobian(rates, inputs[: 1 + len(rates)])[0], symengine.Integer(0)
+        slopes = [row.get(x, zero) for some in (inputs[1 : 1 + len(rates)], inputs[:1]) for row in rows for x in some]
     constants, formed = constants_apart([*rates, *ledger, *margins, *slopes], inputs[1 + 2 * len(rates) :])
     columns, end, given = len(rates) + len(ledger), len(formed) - len(slopes), [*inputs, *constants]
     parts = {"rates": formed[:columns], "margins": formed[columns:end]}
@@ -703,12 +695,6 @@ def _compiled_lanes(
         )
     except NotImplementedError:  # a function without vector code
         return None
-
-
-def _lane_slopes(rates: Sequence[Any], inputs: Sequence[Any]) -> list[Any]:
-    """Return the derivatives of rates by states, row-major, and last by time."""
-    rows, zero = jacobian(rates, inputs[: 1 + len(rates)])[0], symengine.Integer(0)
-    return [row.get(x, zero) for some in (inputs[1 : 1 + len(rates)], inputs[:1]) for row in rows for x in some]
 
 
 def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | None:

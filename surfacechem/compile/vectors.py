@@ -303,9 +303,6 @@ class Code:
         compare = self.builder.icmp_unsigned if truths else self.builder.fcmp_ordered
         return compare(_RELATIONS[type(part).__name__], *values)
 
-    def _joined(self, part: Any, values: Sequence[Any]) -> Any:
-        return reduce(self.builder.and_ if type(part).__name__ == "And" else self.builder.or_, values)
-
     def _extreme(self, part: Any, values: Sequence[Any]) -> Any:
         sign = ">" if type(part).__name__ == "Max" else "<"
         return reduce(lambda a, b: self.builder.select(self.builder.fcmp_ordered(sign, a, b), a, b), values)
@@ -373,7 +370,8 @@ _METHODS: dict[str, Callable[[Any, Any, Any], Any]] = {
     "log": lambda code, _part, values: log(code.builder, *values),
     "Piecewise": Code._piecewise,
     **dict.fromkeys(_RELATIONS, Code._relation),
-    **dict.fromkeys(("And", "Or"), Code._joined),
+    "And": lambda code, _part, values: reduce(code.builder.and_, values),
+    "Or": lambda code, _part, values: reduce(code.builder.or_, values),
     **dict.fromkeys(("Max", "Min"), Code._extreme),
 }
 """Method that generates the vectors of a node of the graph, by its kind."""

@@ -42,6 +42,20 @@ def refuse(connector: Any, message: str) -> NoReturn:
     raise InputError(message)
 
 
+class NoFlow:
+    """A reactor or a reservoir that refuses every flow; Cantera calls these methods."""
+
+    no_inlet: str
+    no_outlet: str
+    """Why a flow cannot end or begin there, after its name."""
+
+    def _add_inlet(self, device: Any) -> None:
+        refuse(device, f"a flow into {self.name} {self.no_inlet}")  # type: ignore[attr-defined]
+
+    def _add_outlet(self, device: Any) -> None:
+        refuse(device, f"a flow out of {self.name} {self.no_outlet}")  # type: ignore[attr-defined]
+
+
 class Receiver:
     """Neighbour of interfaces that receives the products of their reactions."""
 
@@ -103,7 +117,7 @@ class ReactingGasAtPressure(Gas, cantera.ExtensibleIdealGasConstPressureReactor)
 MASS = Spec("kg", "mass at the start", above=0)
 
 
-class ReactingSolid(Receiver, StateVectorReactor):
+class ReactingSolid(NoFlow, Receiver, StateVectorReactor):
     """A solid or a liquid next to the surface of an interface, such as the particle of an electrode or its electrolyte.
 
     ``InterfaceReactor(..., neighbours={name: solid})`` makes it a neighbour. Its variables are its amounts relative to
@@ -131,6 +145,9 @@ class ReactingSolid(Receiver, StateVectorReactor):
         "chemistry_enabled": (True, "Set multipliers on the phase of the interface beside it."),
         "energy_enabled": (False, "Its temperature is held; let a gas or a body have one that follows."),
     }
+
+    no_inlet = "would be lost: only reactions of interfaces change its amounts."
+    no_outlet = "has no source: only reactions of interfaces change its amounts."
 
     def __new__(cls, phase: Any, *, mass: float | str, clone: bool = True, name: str = "solid") -> Self:
         """Use the phase itself, or a copy that Cantera makes for a reservoir."""
@@ -167,12 +184,6 @@ class ReactingSolid(Receiver, StateVectorReactor):
 
     def _add_wall(self, wall: Any) -> None:
         refuse(wall, f"a wall on {self.name} would be without effect: its temperature and pressure are held.")
-
-    def _add_inlet(self, device: Any) -> None:
-        refuse(device, f"a flow into {self.name} would be lost: only reactions of interfaces change its amounts.")
-
-    def _add_outlet(self, device: Any) -> None:
-        refuse(device, f"a flow out of {self.name} has no source: only reactions of interfaces change its amounts.")
 
     def start(self) -> Array:
         return np.asarray(self.x)
@@ -357,8 +368,11 @@ class HeatWall(cantera.Wall):
         self.interface = interface
 
 
-class BodyReservoir(cantera.Reservoir):
+class BodyReservoir(NoFlow, cantera.Reservoir):
     """A reservoir that represents a body: it takes heat through walls and nothing else."""
+
+    no_inlet = "would be lost: a body stores heat, not mass. Let it end in a reactor."
+    no_outlet = "has no source: a body stores heat, not mass. Begin it in a reactor."
 
     def _add_wall(self, wall: Any) -> None:
         if wall.velocity != 0.0 or wall.expansion_rate_coeff != 0.0:
@@ -371,12 +385,6 @@ class BodyReservoir(cantera.Reservoir):
             f"a wall on {self.name} moves, and its work would be lost: a body stores heat here, not volume. Leave out "
             "`velocity` and `K`, or put the moving wall between two gases."
         )
-
-    def _add_inlet(self, device: Any) -> None:
-        refuse(device, f"a flow into {self.name} would be lost: a body stores heat, not mass. Let it end in a reactor.")
-
-    def _add_outlet(self, device: Any) -> None:
-        refuse(device, f"a flow out of {self.name} has no source: a body stores heat, not mass. Begin it in a reactor.")
 
 
 class BodyPort:

@@ -18,7 +18,7 @@ from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError, concise
 from surfacechem.expressions import depends
 from surfacechem.format import Case
-from surfacechem.reactor.coupling import BodyPort, HeatWall, Receiver, function_of, node_of, refuse, suffix_of
+from surfacechem.reactor.coupling import BodyPort, HeatWall, NoFlow, Receiver, function_of, node_of, refuse, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError, History
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.adapters.cantera_network import LEDGER_UNIT, BackOffError, StateVectorReactor, contents
@@ -35,7 +35,7 @@ class InterfaceStopped(Exception):  # noqa: N818 - physics ends here, nothing we
     """The scene ends here, with the reason in words."""
 
 
-class InterfaceReactor(StateVectorReactor):
+class InterfaceReactor(NoFlow, StateVectorReactor):
     """An interface between two bodies as a reactor of a Cantera network.
 
     Parameters
@@ -60,6 +60,8 @@ class InterfaceReactor(StateVectorReactor):
     """
 
     scene: EmbeddedScene
+    no_inlet = "has no volume to fill. Let it end in a reactor beside the interface."
+    no_outlet = "has no volume to come from. Let it begin in a reactor beside the interface."
     switches = {  # noqa: RUF012 - never changed
         "chemistry_enabled": (True, "Reactions stop with `phase.set_multiplier(0.0)`."),
         "energy_enabled": (True, "Hold temperatures in the case: `bodies: {lower: {temperature: 300 K}}`."),
@@ -180,14 +182,6 @@ class InterfaceReactor(StateVectorReactor):
             return
         names = ", ".join(f"{self.name}.body({body.name!r})" for body in self.scene.case.scene.bodies)
         refuse(wall, f"a wall on {self.name} does not say which body it touches. Put it on one of them: {names}.")
-
-    def _add_inlet(self, device: Any) -> None:
-        """Refuse a flow into this reactor; Cantera calls it."""
-        refuse(device, f"{self.name} has no volume that a flow could fill. Let the flow end in a reactor beside it.")
-
-    def _add_outlet(self, device: Any) -> None:
-        """Refuse a flow out of this reactor; Cantera calls it."""
-        refuse(device, f"{self.name} has no volume from which a flow could come. Let it begin in a reactor beside it.")
 
     def add_sensitivity_reaction(self, m: int) -> None:
         """Add sensitivities to the rate of a reaction, by its index from 0; this reactor is in a network already.
