@@ -282,9 +282,6 @@ class _Stretch(Method):
         """Variables, in their units, and their first two derivatives after the last step."""
         self.failure: Exception | None = None
 
-    def advance(self) -> DenseStep:
-        return self.several(1).step(0)
-
     def several(self, most: int) -> Steps:
         reactor, step, derivative = self.reactor, self.net.step, self.net.get_derivative
         times, found = [self.t], [*(self.last or [reactor.scaled.copy()])]
