@@ -679,10 +679,7 @@ def _compiled_lanes(
     known = list(zip(derivatives, rates, strict=True))
     others = [expanded(named, rows) for rows in others]
     ledger, margins = (expanded(known, rows) for rows in others)
-    slopes: list[Any] = []
-    if implicit:  # of rates by states, row-major, and last by time
-        rows, zero = jacobian(rates, inputs[: 1 + len(rates)])[0], symengine.Integer(0)
-        slopes = [row.get(x, zero) for some in (inputs[1 : 1 + len(rates)], inputs[:1]) for row in rows for x in some]
+    slopes = _lane_slopes(rates, inputs) if implicit else []
     constants, formed = constants_apart([*rates, *ledger, *margins, *slopes], inputs[1 + 2 * len(rates) :])
     columns, end, given = len(rates) + len(ledger), len(formed) - len(slopes), [*inputs, *constants]
     parts = {"rates": formed[:columns], "margins": formed[columns:end]}
@@ -695,6 +692,12 @@ def _compiled_lanes(
         )
     except NotImplementedError:  # a function without vector code
         return None
+
+
+def _lane_slopes(rates: Sequence[Any], inputs: Sequence[Any]) -> list[Any]:
+    """Return the derivatives of rates by states, row-major, and last by time."""
+    rows, zero = jacobian(rates, inputs[: 1 + len(rates)])[0], symengine.Integer(0)
+    return [row.get(x, zero) for some in (inputs[1 : 1 + len(rates)], inputs[:1]) for row in rows for x in some]
 
 
 def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | None:

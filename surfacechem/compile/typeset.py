@@ -151,16 +151,18 @@ def statements(system: System) -> list[Statement]:
         for item in system.named
         if item.name in loads and isinstance(item.expression, symengine.Add)
     }
-    named = []
-    for item in system.named:
-        if item.expression not in levels:
-            whole = item.expression.xreplace({} if item.name in loads else given)
-            fitted = any(str(x).startswith(f"{item.name}_ends_") for x in symengine.sympify(whole).free_symbols)
-            named.append(Named(item.quantity, symengine.Symbol(f"{item.name} of a fit") if fitted else readable(whole)))
+    named = [
+        Named(item.quantity, _plain(item.name, item.expression.xreplace({} if item.name in loads else given)))
+        for item in system.named
+        if item.expression not in levels
+    ]
     rows = [line for name, row in system.rows.items() for line in _balance(system, name, row.xreplace(given))]
-    # What the balances read, the last first; all if nothing evolves.
-    read = quantities_read(named, [line.right for line in rows])[::-1] if rows else named
-    return [*rows, *(line for item in read for line in _definition(system, item))]
+    return [*rows, *(line for item in _read(named, rows) for line in _definition(system, item))]
+
+
+def _read(named: Sequence[Named], rows: Sequence[Statement]) -> Sequence[Named]:
+    """Return the quantities that the balances read, the last first; all if nothing evolves."""
+    return quantities_read(named, [line.right for line in rows])[::-1] if rows else named
 
 
 def _constant_values(system: System) -> set[Expression]:
@@ -329,6 +331,13 @@ def _grouped(system: System, item: Named, sides: Splitter, text: str) -> Iterato
     for (left, right), holds in sorted(found.items(), key=lambda item: item[0][1] == 0):
         when = "otherwise" if right == 0 and len(holds) > 2 else " or ".join(holds)
         yield Statement(item.name, left, right, text, when if len(found) > 1 else "")
+
+
+def _plain(name: str, expression: Expression) -> Expression:
+    """Return the expression of a named quantity without its guards; that of a fit by its name."""
+    if any(str(x).startswith(f"{name}_ends_") for x in symengine.sympify(expression).free_symbols):
+        return symengine.Symbol(f"{name} of a fit")
+    return readable(expression)
 
 
 def _tabulated(expression: Expression) -> Expression:

@@ -108,12 +108,16 @@ def _problem(phase: Any, state: Neighbour) -> str:
         return f"the mole fraction of {state.rest} in the neighbour {name} has two roles: give it, or `rest`."
     if state.pressure is not None and not state.pressure.at_start() > 0:
         return f"the pressure of the neighbour {name} is {state.pressure.at_start():g} Pa, not above zero."
-    parts = {species: load.at_start() for species, load in state.composition.items()}
+    return _uneven(name, {species: load.at_start() for species, load in state.composition.items()}, bool(state.rest))
+
+
+def _uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
+    """Return the error of mole fractions, all or all but a ``rest``, in words; empty if there is none."""
     for species, part in parts.items():
         if not 0 <= part <= 1:
             return f"the mole fraction {species} = {part:g} in the neighbour {name} is outside its range: 0 to 1."
     total = sum(parts.values())
-    wrong = total > 1 + SUM_TOLERANCE if state.rest else parts and abs(total - 1) > SUM_TOLERANCE
+    wrong = total > 1 + SUM_TOLERANCE if rest else parts and abs(total - 1) > SUM_TOLERANCE
     return f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1." if wrong else ""
 
 
@@ -274,6 +278,12 @@ class NeighbourReaction(EvaluatedReaction):
         return Formula((), lambda _: self.enthalpy), Formula((), lambda _: self.gibbs)
 
 
+def _amounts_taken(surface: Any, phases: Sequence[Any]) -> Any:
+    """Return the amount of each species of these phases that each reaction takes, shape (species, reactions)."""
+    rows = [index for phase in phases for index in indices(surface, phase)]
+    return np.asarray(surface.reactant_stoich_coeffs - surface.product_stoich_coeffs)[rows]
+
+
 class SurfaceEngine:
     """A Cantera surface that evaluates the net rates of some of its reactions, and what they take from neighbours.
 
@@ -301,10 +311,7 @@ class SurfaceEngine:
         first, own = species[0], [item.variable for item in species]
         self._own = "T_c", first.concentration, *own
         self._sites, self._count = first.sites, len(own)
-        rows = [index for held in self.held for index in indices(surface, held.phase)]
-        taken = surface.reactant_stoich_coeffs - surface.product_stoich_coeffs
-        self._taken = np.asarray(taken)[rows][:, open_ones] / MOLECULAR
-        """Amount of each of their species that each of these reactions takes."""
+        self._taken = _amounts_taken(surface, [held.phase for held in self.held])[:, open_ones] / MOLECULAR
         self._energies = np.empty(0)
         self._lay_out()
         self._brought: list[tuple[object, ...]] = [()]

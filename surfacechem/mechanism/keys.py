@@ -324,6 +324,10 @@ class PhaseCheck:
         self._inside(entry, law.keys, known, title)
         if known:
             self._among(entry.get("orders"), known, f"{title}: orders: no species")
+        self._arrhenius(entry, title)
+
+    def _arrhenius(self, entry: Any, title: str) -> None:
+        error = self.source.error
         rate = entry.get("rate-constant")
         if not isinstance(rate, Mapping):
             raise error(f"{title} has no `rate-constant: {{A, b, Ea}}`.", entry)

@@ -310,9 +310,14 @@ def _reaction(
         message = f"{title}: {elastic[0]} is elastic, which Cantera's equilibrium constant does not know. "
         raise InputError(f"{message}Write two one-way reactions.", place)
     given |= {"whole": whole, "value": 0.0}
-    if beside := {name: nu for name, nu in whole.items() if name not in variables}:
+    if beside := _outside(whole, variables):
         return NeighbourReaction(enthalpy=0.0, gibbs=0.0, in_neighbours=beside, **given)
     return EvaluatedReaction(**given)
+
+
+def _outside(whole: Mapping[str, float], own: Mapping[str, str]) -> dict[str, float]:
+    """Return the part of a change that belongs to other phases."""
+    return {name: nu for name, nu in whole.items() if name not in own}
 
 
 def _lowered(

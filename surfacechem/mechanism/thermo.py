@@ -29,7 +29,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import chain, count
-from typing import Any, Self, cast
+from typing import Any, ClassVar, Self, cast
 
 from surfacechem.contracts.terms import Law, Potential, option, parameter
 from surfacechem.expressions import Expression, by_ranges, log, mixing, polynomial, where
@@ -73,10 +73,18 @@ class ConstantCp(GibbsForm):
 
 
 class Series(GibbsForm):
-    """A form of many coefficients, which are numbers in formulas, so that those of a reaction can be summed.
+    """A heat capacity that is a sum of powers of temperature, with constants of enthalpy and entropy as last numbers.
 
-    A coefficient that a case changes becomes a parameter.
+    Coefficients are numbers in formulas, so that those of a reaction can be summed. One that a case changes becomes a
+    parameter.
     """
+
+    powers: ClassVar[tuple[int, ...]]
+    """Power of each coefficient of the heat capacity."""
+    scale: ClassVar[float] = 1.0
+    """Unit of temperature [K] in the powers."""
+    unit: ClassVar[float] = 1.0
+    """The gas constant in the unit of the coefficients."""
 
     free: frozenset[str] = option("coefficients that are parameters", default=frozenset())
 
@@ -85,6 +93,17 @@ class Series(GibbsForm):
         """Return the form with these coefficients, in the order of its parameters."""
         names = (name for name, _ in cls.specs())
         return cls(**cast(dict[str, Any], dict(zip(names, coefficients, strict=True))))
+
+    def over_R(self, T: Expression) -> Expression:
+        """Value [K] at T [K]."""
+        *coefficients, h, s = (getattr(self, name) for name, _ in self.specs())
+        t = T / self.scale if self.scale != 1 else T
+        value = h - s * t
+        for c, p in zip(coefficients, self.powers, strict=True):
+            # The integral of t^p, less t times that of t^(p - 1).
+            special = {0: t * (1 - log(t)), -1: log(t) + 1}
+            value += c * special[p] if p in special else -c * t ** (p + 1) / (p * (p + 1))
+        return self.scale * value / self.unit if self.scale != 1 else value
 
     def given(self, numbers: Mapping[str, float]) -> Self:
         """Return the same form with other coefficients, as parameters."""
@@ -98,6 +117,8 @@ class Series(GibbsForm):
 class Nasa7(Series):
     """cp/R = a0 + a1 T + ... + a4 T^4, h/R = ... + a5, s/R = ... + a6."""
 
+    powers = 0, 1, 2, 3, 4
+
     a0: float = parameter("1", "constant part of cp/R")
     a1: float = parameter("1/K", "coefficient of T in cp/R")
     a2: float = parameter("1/K^2", "coefficient of T^2 in cp/R")
@@ -106,14 +127,11 @@ class Nasa7(Series):
     a5: float = parameter("K", "constant part of h/R")
     a6: float = parameter("1", "constant part of s/R")
 
-    def over_R(self, T: Expression) -> Expression:
-        """Value [K] at T [K]."""
-        power = self.a0 * T * (1 - log(T)) - self.a1 * T**2 / 2 - self.a2 * T**3 / 6
-        return power - self.a3 * T**4 / 12 - self.a4 * T**5 / 20 + self.a5 - self.a6 * T
-
 
 class Nasa9(Series):
     """cp/R = a0/T^2 + a1/T + a2 + a3 T + ... + a6 T^4, h/R = ... + a7, s/R = ... + a8."""
+
+    powers = -2, -1, 0, 1, 2, 3, 4
 
     a0: float = parameter("K^2", "coefficient of 1/T^2 in cp/R")
     a1: float = parameter("K", "coefficient of 1/T in cp/R")
@@ -125,15 +143,11 @@ class Nasa9(Series):
     a7: float = parameter("K", "constant part of h/R")
     a8: float = parameter("1", "constant part of s/R")
 
-    def over_R(self, T: Expression) -> Expression:
-        """Value [K] at T [K]."""
-        inverse = -self.a0 / (2 * T) + self.a1 * (log(T) + 1) + self.a2 * T * (1 - log(T))
-        power = -self.a3 * T**2 / 2 - self.a4 * T**3 / 6 - self.a5 * T**4 / 12 - self.a6 * T**5 / 20
-        return inverse + power + self.a7 - self.a8 * T
-
 
 class Shomate(Series):
     """cp = A + B t + C t^2 + D t^3 + E / t^2 with t = T / 1000 K, h = 1000 K (A t + ... - E / t + F), s = ... + G."""
+
+    powers, scale, unit = (0, 1, 2, 3, -2), 1000.0, GAS_CONSTANT
 
     A: float = parameter("J/(mol K)", "constant part of cp")
     B: float = parameter("J/(mol K)", "coefficient of t in cp")
@@ -142,13 +156,6 @@ class Shomate(Series):
     E: float = parameter("J/(mol K)", "coefficient of 1/t^2 in cp")
     F: float = parameter("J/(mol K)", "constant part of h over 1000 K")
     G: float = parameter("J/(mol K)", "constant part of s")
-
-    def over_R(self, T: Expression) -> Expression:
-        """Value [K] at T [K]."""
-        t = T / 1000
-        h = self.A * t + self.B * t**2 / 2 + self.C * t**3 / 3 + self.D * t**4 / 4 - self.E / t + self.F
-        s = self.A * log(t) + self.B * t + self.C * t**2 / 2 + self.D * t**3 / 3 - self.E / (2 * t**2) + self.G
-        return 1000 * (h - t * s) / GAS_CONSTANT
 
 
 @dataclass(frozen=True)

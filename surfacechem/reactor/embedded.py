@@ -19,7 +19,7 @@ from surfacechem.expressions import depends
 from surfacechem.format import Case
 from surfacechem.mechanism.evaluated import HeldPhase
 from surfacechem.model.assemble import assemble
-from surfacechem.model.system import END_PATH
+from surfacechem.model.system import END_PATH, System
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import coupling
 from surfacechem.results.solution import Solution
@@ -151,6 +151,15 @@ class EndError(Exception):
     """The scene ends at a state, with the reason in words."""
 
 
+def _refuse_folds(system: System) -> None:
+    folds = [item.reason for item in system.edges if item.fold is not None]
+    if folds:
+        raise InputError(
+            f"the scene loses a quasi-static equilibrium ({folds[0]}), at which the gap is infinitely fast, so that an "
+            "integrator without our search cannot come near. Give the gap a damper or a mass, or run the case alone."
+        )
+
+
 def _combination(states: Array, accounts: Array) -> Array:
     """Return the fixed combinations of the rates of states that give those of accounts: [state, account], or zero.
 
@@ -193,13 +202,7 @@ class EmbeddedScene:
             scene = coupling.with_loads(scene, {name: function(0.0) for name, function in loads.items()})
             scene = coupling.with_neighbours(scene, neighbours or {})
             system = assemble(scene).with_multipliers()
-            for edge in system.edges:
-                if edge.fold is not None:
-                    raise InputError(
-                        f"the scene loses a quasi-static equilibrium ({edge.reason}), at which the gap is infinitely "
-                        "fast, so that an integrator without our search cannot come near. Give the gap a damper or a "
-                        "mass, or run the case alone."
-                    )
+            _refuse_folds(system)
             self.places = {parameter.path: j for j, parameter in enumerate(system.parameters)}
             """Indices of the parameters, by path."""
             unread = [name for name, path in zip(loads, self.loads, strict=True) if path not in self.places]

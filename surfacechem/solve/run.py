@@ -406,9 +406,9 @@ def stable_guess(system: System, program: Program, y: Array, parameters: Array) 
     Heat production that grows with temperature can balance the losses twice: in a stable state, and at a higher
     temperature in one from which any perturbation leads to ignition or cooling.
     """
-    guessed = np.array([state.algebraic and state.is_temperature for state in system.states])
-    if not guessed.any():
+    if not any(state.algebraic and state.is_temperature for state in system.states):
         return y
+    guessed = np.array([state.algebraic and state.is_temperature for state in system.states])
     if not _are_stable(system, program, y[None], parameters)[0]:
         tried = np.array([np.where(guessed, part * y, y) for part in COLDER_GUESSES])
         stable = _are_stable(system, program, tried, parameters)
@@ -543,7 +543,8 @@ class Model:
             segments, parameters = pieces.cut(segments, parameters)
         y = system.initial_state(values)
         columns, begun = self.starts
-        parameters[:, columns] = begun(np.concatenate([[0.0], y, np.zeros_like(y), parameters[0]]))
+        if columns:
+            parameters[:, columns] = begun(np.concatenate([[0.0], y, np.zeros_like(y), parameters[0]]))
         pieces.start_registers(system, parameters, values)
         self._limits.check(y, parameters[0])
         if run.closer % 2:  # where a result depends on the last digits, two runs of the same numbers would agree
