@@ -54,21 +54,14 @@ SEEN_PART = 0.99
 def figure_of_members(dataset: Data, plan: Plan, axes: Sequence[str], variables: Sequence[str] | None = None) -> Figure:
     """Draw a grid of two parameters, a sample, or a grid of more parameters."""
     dataset = with_final_bonds(dataset, axes)
-    parameters = [name for name in dataset.coords if len(dataset[name].dims) == 1 and dataset[name].dims[0] in axes]
-    names = chosen(dataset, axes, variables)
+    known = number_names(dataset, axes)
+    refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
+    names = list(dict.fromkeys(variables or ())) or varying_numbers(dataset, axes, known)
     if len(dataset[names[0]].dims) > len(axes):
         return curves(dataset, axes, names)
     if len(axes) == 2 and RUN_DIMENSION not in axes:
         return heat_maps(dataset, plan, axes, names)
-    parameters.sort(key=lambda name: [*plan.paths, ""].index(path_of(name, plan)))
-    return effects(dataset, plan, axes, parameters, names)
-
-
-def chosen(dataset: Data, axes: Sequence[str], variables: Sequence[str] | None) -> list[str]:
-    """Return the variables to be drawn: those asked for, else final values that differ between runs."""
-    known = number_names(dataset, axes)
-    refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
-    return list(dict.fromkeys(variables)) if variables else varying_numbers(dataset, axes, known)
+    return effects(dataset, plan, axes, names)
 
 
 def number_names(dataset: Data, axes: Sequence[str]) -> list[str]:
@@ -226,8 +219,10 @@ def line_style(dataset: Data, axes: Sequence[str], member: int) -> dict[str, Any
     return {"color": colours(dataset, axes).to_rgba(value), "linewidth": 0.9}
 
 
-def effects(dataset: Data, plan: Plan, axes: Sequence[str], parameters: Sequence[str], names: Sequence[str]) -> Figure:
+def effects(dataset: Data, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
     """Draw the distribution of each variable, and its median and band over each parameter, for all values of others."""
+    parameters = [name for name in dataset.coords if len(dataset[name].dims) == 1 and dataset[name].dims[0] in axes]
+    parameters.sort(key=lambda name: [*plan.paths, ""].index(path_of(name, plan)))
     drawn = plan.sample.draws if plan.sample else {}
     ratios = {axis.path: axis.logarithmic for axis in plan.axes}
     ratios |= {path: draw.over_decades for path, draw in drawn.items()}
@@ -331,37 +326,28 @@ def figure_of_rupture(dataset: Data, load: str, variables: Sequence[str] | None 
     return plot
 
 
-def _members(dataset: Data, load: str) -> list[tuple[tuple[int, ...], str]]:
-    """Return indices and names of some runs, evenly spread over those whose most probable load is positive."""
-    modes = dataset[f"{load}_mode"].values
-    # At low loading rates most bonds break before the load grows, and their peak at zero would dwarf all others.
-    inside = np.argwhere(modes > dataset[load].values[0])
-    places = inside if len(inside) else np.argwhere(np.full(modes.shape, True))
-    chosen = places[style.evenly_spread(len(places), MOST_CURVES)]
-    return [(tuple(at), style.member_name(dataset, at)) for at in chosen.tolist()]
-
-
 def _draw_over(ax: Axes, dataset: Data, load: str, values: Array, scale: Callable[[Array], Array] = np.asarray) -> None:
-    """Draw values of some runs over the load; as one curve if they coincide on this scale."""
-    members = _members(dataset, load)
-    count = dataset["status"].values.size
-    notes = [f"{len(members)} of {count} runs"] if len(members) < count else []
-    shown = np.array([values[place] for place, _ in members])
-    if len(members) > 1 and _coincide(scale(shown)):
-        ax.plot(dataset[load].values, np.fmin.reduce(shown), color="black", linewidth=LINE_WIDTH)
+    """Draw values of some runs over the load, evenly spread over those whose most probable load is positive; as one
+    curve if they coincide on this scale.
+    """
+    modes, x = dataset[f"{load}_mode"].values, dataset[load].values
+    # At low loading rates most bonds break before the load grows, and their peak at zero would dwarf all others.
+    inside = np.argwhere(modes > x[0])
+    places = inside if len(inside) else np.argwhere(np.full(modes.shape, True))
+    members = places[style.evenly_spread(len(places), MOST_CURVES)].tolist()
+    notes = [f"{len(members)} of {modes.size} runs"] if len(members) < modes.size else []
+    shown = np.array([values[tuple(place)] for place in members])
+    low, high = np.fmin.reduce(scale(shown)), np.fmax.reduce(scale(shown))
+    # Curves coincide if they nowhere differ by more than the width of their line, where they are known.
+    apart, range_ = np.fmax.reduce(high - low), np.fmax.reduce(high) - np.fmin.reduce(low)
+    if len(members) > 1 and apart * 72 * PANEL_HEIGHT <= LINE_WIDTH * range_:
+        ax.plot(x, np.fmin.reduce(shown), color="black", linewidth=LINE_WIDTH)
         notes.append("their curves coincide" if notes else "the curves of all runs coincide")
     else:
-        for (place, label), colour in zip(members, COLOURS, strict=False):
-            ax.plot(dataset[load].values, values[place], color=colour, linewidth=LINE_WIDTH, label=label)
+        for place, curve, colour in zip(members, shown, COLOURS, strict=False):
+            ax.plot(x, curve, color=colour, linewidth=LINE_WIDTH, label=style.member_name(dataset, place))
     style.label_variable(ax.xaxis, dataset[load])
     ax.set_title(", ".join(notes), loc="right", **style.NOTE_STYLE)
-
-
-def _coincide(curves: Array) -> bool:
-    """True if curves nowhere differ by more than the width of their line, where they are known."""
-    low, high = np.fmin.reduce(curves), np.fmax.reduce(curves)
-    apart, range_ = np.fmax.reduce(high - low), np.fmax.reduce(high) - np.fmin.reduce(low)
-    return bool(apart * 72 * PANEL_HEIGHT <= LINE_WIDTH * range_)
 
 
 def _draw_series(ax: Axes, dataset: Data, load: str, name: str) -> None:
@@ -416,30 +402,23 @@ def lifetimes(dataset: Data) -> Figure:
         _draw_statistics(above, dataset, {"lifetime": "runs"}, 1.0)
         above.set_ylabel(r"Lifetime $\tau$ [s]")
         style.make_logarithmic(above.yaxis)
-        _draw_survival(below, dataset)
+        # The survival over time, of runs evenly spread over those with a known lifetime.
+        known = np.argwhere(np.isfinite(dataset["lifetime"].values))
+        chosen = style.evenly_spread(len(known), MOST_CURVES)
+        times, survival, last = (dataset[name].values for name in ("time", "survival", "time_reached"))
+        for place, colour in zip(known[chosen], COLOURS, strict=False):
+            # A run ends when all bonds have broken: NaN after its end is a survival of zero.
+            values = np.nan_to_num(survival[tuple(place)])
+            below.plot(times, values, color=colour, label=style.member_name(dataset, place))
+        lifetimes, begin = np.sort(dataset["lifetime"].values[tuple(known.T)]), 0.0
+        if wants_log_axis(times) or style.over_decades(lifetimes):
+            style.make_logarithmic(below.xaxis)
+            begin = max(times[times > 0][0], NEGLIGIBLE_LIFETIME * lifetimes[0])
+        below.set(xlim=(begin, last.max()), xlabel="Time [s]", ylabel="Survival $S$ [1]")
         for ax in (above, below):
             style.legend(ax)
         style.headings(plot, above, dataset)
     return plot
-
-
-def _draw_survival(ax: Axes, dataset: Data) -> None:
-    """Draw the survival over time of runs evenly spread over those with a known lifetime."""
-    known = np.argwhere(np.isfinite(dataset["lifetime"].values))
-    chosen = style.evenly_spread(len(known), MOST_CURVES)
-    times, survival = dataset["time"].values, dataset["survival"].values
-    for place, colour in zip(known[chosen], COLOURS, strict=False):
-        # A run ends when all bonds have broken: NaN after its end is a survival of zero.
-        values = np.nan_to_num(survival[tuple(place)])
-        ax.plot(times, values, color=colour, label=style.member_name(dataset, place))
-    lifetimes = np.sort(dataset["lifetime"].values[tuple(known.T)])
-    if wants_log_axis(times) or style.over_decades(lifetimes):
-        style.make_logarithmic(ax.xaxis)
-        begin = max(times[times > 0][0], NEGLIGIBLE_LIFETIME * lifetimes[0])
-        ax.set_xlim(begin, dataset["time_reached"].values.max())
-    else:
-        ax.set(xlim=(0, dataset["time_reached"].values.max()))
-    ax.set(xlabel="Time [s]", ylabel="Survival $S$ [1]")
 
 
 # Largest number of parameters of a grid for curves.
@@ -498,26 +477,22 @@ def axes_of(dataset: Data) -> list[str]:
     return [*dataset["status"].dims] if "status" in dataset else []
 
 
-def _numbers(dataset: Data) -> list[str]:
-    """Return the names of variables that curves over the swept parameter show; coverages also have their own names."""
-    lists = {"event", "species"}
-    return [name for name in number_names(dataset, axes_of(dataset)) if lists.isdisjoint(dataset[name].dims)]
-
-
 def panels(dataset: Data, variables: Sequence[str] | None) -> list[Panel]:
     """Return panels of the variables, else of the most probable load at rupture, else of those that vary."""
-    known, load = _numbers(dataset), load_of(dataset)
+    axes, load = axes_of(dataset), load_of(dataset)
+    # Coverages also have their own names.
+    known = [name for name in number_names(dataset, axes) if {"event", "species"}.isdisjoint(dataset[name].dims)]
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
-    names = [[name] for name in dict.fromkeys(variables or ())] or ([[f"{load}_mode"]] if load else _dependent(dataset))
+    names = [f"{load}_mode"] if load and not variables else variables
+    groups = [[name] for name in dict.fromkeys(names or ())] or _dependent(dataset, axes, known)
     # A store may have only one number per run.
-    names = names or [[name] for name in varying_numbers(dataset, axes_of(dataset), known)]
-    return [Panel("", unit(dataset[group[0]]), group) for group in names]
+    groups = groups or [[name] for name in varying_numbers(dataset, axes, known)]
+    return [Panel("", unit(dataset[group[0]]), group) for group in groups]
 
 
-def _dependent(dataset: Data) -> list[list[str]]:
+def _dependent(dataset: Data, axes: Sequence[str], known: Sequence[str]) -> list[list[str]]:
     """Return temperatures and bonds whose final values depend on the sweep; with several parameters one per panel."""
-    axes, found = axes_of(dataset), []
-    along = [name for name in _numbers(dataset) if len(dataset[name].dims) > len(axes)]
+    found, along = [], [name for name in known if len(dataset[name].dims) > len(axes)]
     for _, *kind in PANELS[:2]:
         names = [name for name in of_kind(dataset, along, *kind) if varies(final_values(dataset, name).ravel())]
         found += [[name] for name in names] if len(axes) > 1 else [names] if names else []
