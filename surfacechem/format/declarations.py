@@ -529,12 +529,16 @@ class Section:
         """True if any of these keys is given."""
         return isinstance(self.tree.value, dict) and any(name in self.tree.value for name in names)
 
-    def error(self, message: str, *names: str) -> InputError:
-        """Return an input error at one of the given keys, preferably one set from outside, else the first; without any
-        at the section.
+    def place(self, *names: str) -> Place:
+        """Return the place of one of the given keys, preferably one set from outside, else the first; without any that
+        of the section.
         """
         given: list[Tree] = [self.tree.value[name] for name in names if self.has(name)]
-        return min([*given, self.tree][: len(given) or 1], key=lambda tree: tree.place.file != OVERRIDE).error(message)
+        return min([*given, self.tree][: len(given) or 1], key=lambda tree: tree.place.file != OVERRIDE).place
+
+    def error(self, message: str, *names: str) -> InputError:
+        """Return an input error at the place of these keys."""
+        return InputError(message, self.place(*names))
 
 
 S = TypeVar("S", bound=Section)

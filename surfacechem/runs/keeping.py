@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.errors import suggestion
+from surfacechem.errors import refuse_unknown
 from surfacechem.format.sections import ALL, KeepSection
 from surfacechem.model.system import Margin, System
 from surfacechem.results.audit import Audit, audit
@@ -105,12 +105,8 @@ def keep_of(section: KeepSection | None, system: System) -> Keep:
     for key, kind in kinds.items():
         given = getattr(section, key)
         found[key] = tuple(known[kind] if given == ALL else given)
-        for name in found[key]:
-            if name not in known[kind]:
-                raise section.error(f"no {kind} are called '{name}'.{suggestion(name, known[kind])}", key)
-    for name in section.reach:
-        if name not in known["quantities"]:
-            raise section.error(f"nothing in this case is called '{name}'.", "reach")
+        refuse_unknown(found[key], known[kind], f"no {kind} are called '{{}}'", section.place(key))
+    refuse_unknown(section.reach, known["quantities"], "nothing in this case is called '{}'", section.place("reach"))
     return Keep(**found, reach=dict(section.reach), balances=section.balances == ALL)
 
 

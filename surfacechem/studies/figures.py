@@ -289,8 +289,7 @@ def _computed(section: CurveSection, folder: Path, exact: str) -> tuple[xarray.D
 
 def _values(dataset: xarray.Dataset, axis: AxisSection) -> Array:
     """Return a variable of a run over time, or its values at the ends of the runs of a sweep."""
-    place = axis.tree.value["variable"].place
-    refuse_unknown([axis.variable], list(map(str, dataset.variables)), "no variable '{}'", place)
+    refuse_unknown([axis.variable], list(map(str, dataset.variables)), "no variable '{}'", axis.place("variable"))
     values = dataset[axis.variable]
     return np.asarray(values.values if values.ndim == 1 else values.isel(time=-1).values, dtype=float)
 
