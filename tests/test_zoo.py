@@ -33,7 +33,7 @@ REFERENCED = [member.name for member in MEMBERS.values() if "exact" in member.ta
 # -- equations --------------------------------------------------------------------------------------------------------
 
 
-@each(cases=3)
+@each(cases=6)
 def test_both_laws_of_thermodynamics_hold_on_the_equations(member):
     """Where a gap is in equilibrium its rate follows from that: a point at which the index is one, or Newton fails.
 
@@ -67,7 +67,7 @@ def test_the_magnitude_of_an_expression_bounds_the_error_of_its_machine_code(nam
     assert np.all(bounds >= np.abs(values) * (1 - ULPS))
 
 
-@each(cases=3)
+@each(cases=6)
 def test_compiled_jacobians_are_those_of_their_equations(member):
     """By differences in 60 digits; for a case in modes drawn at random, and away from what the equations ask for."""
     system, draw = member.system, random.Random(member.name)
@@ -91,7 +91,7 @@ def test_compiled_jacobians_are_those_of_their_equations(member):
             assert found[row, column] == pytest.approx(exact, rel=1e-9, abs=rounding)
 
 
-@each(cases=3)
+@each(cases=6)
 def test_equations_are_linear_in_the_rates(member):
     for row in member.system.residual():
         rates = [s.dot for s in member.system.states if s.dot in row.free_symbols]

@@ -266,7 +266,7 @@ LINEAR_CASES = (
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6])
-@pytest.mark.parametrize(("name", "others"), LINEAR_CASES)
+@pytest.mark.parametrize(("name", "others"), every(2, LINEAR_CASES))
 def test_linearly_implicit_runs_keep_the_tolerance(name, others, rtol, left, monkeypatch):
     problem, columns = arrays_of(case_runs.load(name), implicit=True, rtol=rtol)
     # What they leave would be solved by these.
