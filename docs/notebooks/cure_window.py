@@ -25,7 +25,7 @@ one.plot(["T", "phi"])
 # %% [markdown]
 # ## The window
 #
-# Two parameters, five hundred runs. Of each a store keeps the largest temperature and the time at which 80 % are
+# Two parameters, 130 runs. Of each a store keeps the largest temperature and the time at which 80 % are
 # cured.
 
 # %%
@@ -34,11 +34,11 @@ window = surfacechem.load(
     {
         "sweep": {
             "over": {
-                "initial.T": {"from": "150 degC", "to": "190 degC", "points": 25},
+                "initial.T": {"from": "150 degC", "to": "190 degC", "points": 13},
                 "bodies.upper.C": {
                     "from": "0.5 kJ/m^2/K",
                     "to": "5 kJ/m^2/K",
-                    "points": 20,
+                    "points": 10,
                 },
             },
             "keep": {"max": ["T"], "reach": {"phi": 0.8}},

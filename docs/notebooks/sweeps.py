@@ -20,7 +20,7 @@ folder = Path(tempfile.mkdtemp())
 # Every run pulls until all bonds are broken; coloured points are the runs, black dots the exact formulas.
 
 # %%
-rates = {"from": "0.01 pN/s", "to": "100 nN/s", "points": 57, "spacing": "logarithmic"}
+rates = {"from": "0.01 pN/s", "to": "100 nN/s", "points": 29, "spacing": "logarithmic"}
 spectrum = surfacechem.sweep(
     "force-spectroscopy", {"loading.f.ramp.rate": rates}, {"f": "200 pN"}
 )
@@ -42,17 +42,17 @@ window = surfacechem.load(
                 "interface.potential.bond-energy.K_0": {
                     "from": "20 J/m^2",
                     "to": "300 J/m^2",
-                    "points": 60,
+                    "points": 30,
                 },
                 "interface.bonding.linear-affinity.c_r": {
                     "from": "1e15 1/J/s",
                     "to": "2e16 1/J/s",
-                    "points": 50,
+                    "points": 25,
                     "spacing": "logarithmic",
                 },
             },
             "keep": {"max": ["T"], "reach": {"phi": 0.95}},
-            "checked": 50,
+            "checked": 20,
         }
     },
 )
