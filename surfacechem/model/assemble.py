@@ -24,7 +24,7 @@ import symengine
 from surfacechem.contracts.terms import Spec
 from surfacechem.contracts.units import TOTAL_UNITS
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.expressions import Expression, certain, depends
+from surfacechem.expressions import Expression, depends
 from surfacechem.model import components, constraints, ledger
 from surfacechem.model.build import Build
 from surfacechem.model.components.sliding_friction import stands_for_velocity
@@ -338,19 +338,14 @@ class StartLimits:
 
 def _value_of(expression: Expression, places: Mapping[Any, int]) -> Callable[[Sequence[float]], float | None]:
     """Return the function for the value of an expression without roundoff, None if a symbol has no number, from the
-    numbers at these places; if it is positive beyond roundoff, a bound below may stand for it.
+    numbers at these places.
     """
     if (terms := _sum(expression, places)) is not None:
         return lambda numbers: math.fsum([factor * numbers[place] for place, factor in terms])
-    symbols = expression.free_symbols
-    known = {x: places[x] for x in symbols if x in places}
-    bound = cache(lambda: symengine.Lambdify([*known], [certain(expression)]))
+    known = {x: places[x] for x in expression.free_symbols if x in places}
 
     @lru_cache(maxsize=64)  # runs that differ in other numbers, as a run and its second one, start from the same
     def value(*own: float) -> float | None:
-        # Exact arithmetic takes longer than a brief run: of many starts the first, and those near a limit, need it.
-        if value.cache_info().currsize and len(known) == len(symbols) and (least := float(bound()(own)[0])) > 0:
-            return least
         found = expression.subs(dict(zip(known, map(_exact, own), strict=True)))
         return None if found.free_symbols else float(found)
 
