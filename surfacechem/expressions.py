@@ -16,6 +16,19 @@ from surfacechem.tolerances import FORMULA_EPS, FRACTION_FLOOR, GUARD_EPS
 Expression: TypeAlias = Any
 """A float or a SymEngine expression."""
 
+
+class _Lazy:
+    """SymEngine, imported when the first symbol appears: numbers do without it."""
+
+    def __getattr__(self, name: str) -> Any:
+        import symengine
+
+        setattr(self, name, getattr(symengine, name))
+        return getattr(symengine, name)
+
+
+symengine: Any = _Lazy()
+
 EXPONENT_CAP = 300.0
 """Largest exponent of a plain exponential; above it exp continues as its tangent.
 
@@ -43,8 +56,6 @@ def _symbols(expression: Expression) -> Any:
 
 def without(expression: Expression, known: Mapping[Any, Expression]) -> Expression:
     """Replace the known symbols in an expression; only those in it are passed on, as SymEngine would search for all."""
-    import symengine
-
     whole = symengine.sympify(expression)
     parts = {symbol: known[symbol] for symbol in whole.free_symbols if symbol in known}
     return whole.subs(parts) if parts else whole
@@ -58,8 +69,6 @@ def derivative(expression: Expression, symbol: Expression) -> Expression:
     >>> derivative(derivative(T * log_fraction(x), T), T), derivative(power(x, 0.95), T)
     (0, 0)
     """
-    import symengine
-
     result = symengine.diff(symengine.sympify(expression), symbol)
     zero = symengine.Integer(0)
     while empty := {p: zero for p in result.atoms(symengine.Piecewise) if all(v == 0 for v in p.args[::2])}:
@@ -76,8 +85,6 @@ def terms_of(expression: Expression) -> dict[Any, list[Expression]]:
     >>> terms[x], terms[y]
     ([x], [2*y])
     """
-    import symengine
-
     whole = symengine.sympify(expression)
     found: dict[Any, list[Expression]] = {}
     for term in whole.args if whole.is_Add else (whole,):
@@ -97,8 +104,6 @@ def gradient(expression: Expression, known: dict[Any, dict[Any, Expression]] | N
     >>> slopes[x], slopes[y]
     (y, 2 + x)
     """
-    import symengine
-
     whole = symengine.sympify(expression)
     known = {} if known is None else known
     if whole in known:
@@ -110,8 +115,6 @@ def gradient(expression: Expression, known: dict[Any, dict[Any, Expression]] | N
 
 def _slopes(whole: Any, known: dict[Any, dict[Any, Expression]]) -> dict[Any, list[Expression]]:
     """Return the terms of the derivatives of a node by each symbol, one from each of its arguments."""
-    import symengine
-
     if whole.is_Symbol:
         return {whole: [symengine.Integer(1)]}
     found: dict[Any, list[Expression]] = {}
@@ -132,8 +135,6 @@ def _slopes(whole: Any, known: dict[Any, dict[Any, Expression]]) -> dict[Any, li
 
 def _partial(whole: Any, k: int) -> Expression:
     """Differentiate a sum, product, power or function by its argument number k."""
-    import symengine
-
     arguments = whole.args
     if whole.is_Add:
         return 1
@@ -169,8 +170,6 @@ def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = N
     >>> magnitude(positive(y - 1)).subs({y: 1.0})
     2.0
     """
-    import symengine
-
     known = dict(sizes or {})
 
     def bound(e: Any) -> Any:
@@ -198,20 +197,14 @@ def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = N
     return bound(symengine.sympify(expression))
 
 
-def _engine(*values: Expression) -> Any:
-    if is_symbolic(*values):
-        import symengine
-
-        return symengine
-    return math
+def _engine(x: Expression) -> Any:
+    return symengine if is_symbolic(x) else math
 
 
 def where(condition: Expression, yes: Expression, no: Expression) -> Expression:
     """Return ``yes`` where the condition holds, else ``no``."""
     if isinstance(condition, bool):
         return yes if condition else no
-    import symengine
-
     return symengine.Piecewise((yes, condition), (no, True))
 
 
@@ -255,8 +248,6 @@ def exp(x: Expression) -> Expression:
         return math.exp(x) if x < EXPONENT_CAP else math.exp(EXPONENT_CAP) * (1 + x - EXPONENT_CAP)
     if x.is_Number:
         return exp(float(x))
-    import symengine
-
     top = math.exp(EXPONENT_CAP)
     return where(x < EXPONENT_CAP, symengine.exp(x), top * (x + (1 - EXPONENT_CAP)))
 
@@ -278,8 +269,6 @@ def scaled_exp(factor: Expression, exponent: Expression) -> Expression:
         if exponent < LITERAL or not 0 < factor < 1:
             return factor * exp(exponent)
         return exp(exponent + math.log(factor))
-    import symengine
-
     rest, own = _exponential(factor)
     exponent = symengine.sympify(exponent + own)
     if rest == 0 or exponent == 0:
@@ -303,8 +292,6 @@ def product(*factors: Expression) -> Expression:
 
 def _exponential(factor: Expression) -> tuple[Expression, Expression]:
     """Split a product into its other factors and the sum of the exponents of its (guarded) exponentials."""
-    import symengine
-
     node = symengine.sympify(factor)
     rest, exponent = symengine.Integer(1), symengine.Integer(0)
     for part in node.args if node.is_Mul else (node,):
@@ -330,8 +317,6 @@ def exponents(expression: Expression) -> list[Expression]:
     """
     if not is_symbolic(expression):
         return []
-    import symengine
-
     conditions = {condition for piece in expression.atoms(symengine.Piecewise) for condition in piece.args[1::2]}
     return [item.args[0] for item in conditions if len(item.args) == 2 and item.args[1] == EXPONENT_CAP]
 
@@ -342,8 +327,6 @@ def expm1(x: Expression) -> Expression:
         return math.expm1(x) if x < EXPONENT_CAP else exp(x)
     if x.is_Number:
         return expm1(float(x))
-    import symengine
-
     # 2 e^(x/2) sinh(x/2) is accurate near zero; in the outer pieces one of its factors would over- or underflow.
     middle = 2 * symengine.exp(x / 2) * symengine.sinh(x / 2)
     return symengine.Piecewise((symengine.exp(x) - 1, x < -30.0), (middle, x < EXPONENT_CAP), (exp(x), True))
@@ -362,8 +345,6 @@ def scaled_expm1(factor: Expression, x: Expression, shift: Expression = 0) -> Ex
 
 def _falling(x: Expression) -> Expression:
     """exp(x) - 1 for a symbolic x <= 0."""
-    import symengine
-
     return where(x < -30.0, symengine.exp(x) - 1, 2 * symengine.exp(x / 2) * symengine.sinh(x / 2))
 
 
@@ -371,8 +352,6 @@ def decay(x: Expression) -> Expression:
     """exp(-x) for x >= 0; unlike those of a guarded exp, like terms of its derivatives combine."""
     if not is_symbolic(x):
         return exp(-x)
-    import symengine
-
     return symengine.exp(-x)
 
 
@@ -389,8 +368,6 @@ def log_fraction(x: Expression) -> Expression:
     """Natural logarithm of a fraction, or of a rate that may vanish; finite at zero."""
     if not is_symbolic(x):
         return math.log(max(x, FRACTION_FLOOR))
-    import symengine
-
     return where(x > FRACTION_FLOOR, symengine.log(x), math.log(FRACTION_FLOOR))
 
 
@@ -404,8 +381,6 @@ def mixing(x: Expression) -> Expression:
     """
     if not is_symbolic(x):
         return x * log_fraction(x)
-    import symengine
-
     return where(x > FRACTION_FLOOR, x * symengine.log(x), math.log(FRACTION_FLOOR) * x)
 
 
@@ -435,8 +410,6 @@ def asinh_exp(x: Expression, exponent: Expression) -> Expression:
         if exponent < LARGE_EXPONENT:
             return math.asinh(x * math.exp(exponent))
         return math.copysign(math.log(2 * abs(x)) + exponent, x)
-    import symengine
-
     plain = symengine.asinh(x * exp(exponent))
     size = absolute(x)
     far = sign(x) * (log(where(size > FRACTION_FLOOR, size, FRACTION_FLOOR + 0 * size)) + math.log(2) + exponent)
@@ -481,8 +454,6 @@ def sign(x: Expression) -> Expression:
     """-1, 0 or 1."""
     if not is_symbolic(x):
         return math.copysign(1.0, x) if x else 0.0
-    import symengine
-
     return symengine.Piecewise((1.0, x > 0), (-1.0, x < 0), (0.0, True))
 
 

@@ -10,6 +10,7 @@ import json
 import math
 import random
 from collections.abc import Callable, Iterator, Mapping
+from copy import copy
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -80,6 +81,9 @@ def argument(law: Law, name: str, draw: random.Random, far: bool = False) -> flo
     return size * draw.choice((1, 1, -1)) if either else size
 
 
+NO_FORMULAS = ("breakpoints", "jumps", "piece", "stoichiometry", "is_default", "refine", *NUMERIC)
+
+
 def formulas(law: Law) -> Iterator[tuple[str, Callable[..., Any]]]:
     """Everything that a law computes from variables."""
     base = next(c for c in CONTRACTS if isinstance(law, c))
@@ -91,16 +95,8 @@ def formulas(law: Law) -> Iterator[tuple[str, Callable[..., Any]]]:
         if name == "channels" and item is not None:
             yield from item().items()
         elif name in ("ranges", "limits"):
-            yield name, partial(getattr(type(law), name).fget, law)
-        elif callable(item) and name not in (
-            "breakpoints",
-            "jumps",
-            "piece",
-            "stoichiometry",
-            "is_default",
-            "refine",
-            *NUMERIC,
-        ):
+            yield name, partial(copy, item)
+        elif callable(item) and name not in NO_FORMULAS:
             yield name, item
 
 

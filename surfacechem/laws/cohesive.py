@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 from surfacechem.contracts.terms import Limit, RateLaw, TangentialPotential, parameter
 from surfacechem.expressions import EXPONENT_CAP, Expression, decay, positive, sqrt, where
@@ -168,10 +169,8 @@ class AdhesionLoss(RateLaw):
 
     b: float = parameter("J s/m^2", "viscosity of adhesion", above=0)
 
-    @property
-    def kinks(self) -> Mapping[str, Expression]:
-        """Zero chemical potential, at which loss ends."""
-        return {"mu": 0.0}
+    kinks: ClassVar[Mapping[str, float]] = {"mu": 0.0}
+    """Zero chemical potential, at which loss ends."""
 
     def rate(self, mu: Expression, n_c: Expression, N_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from surfacechem.contracts.terms import (
     FilmGrowth,
@@ -79,10 +79,8 @@ class RarefiedFilm(HeatTransfer):
     alpha_2: float = parameter("1", "thermal accommodation at the second end", default=1.0, above=0, at_most=1)
     Y: float = parameter("m", "mean gap at touch, left by the roughness", default=0.0, at_least=0)
 
-    @property
-    def peaks(self) -> Mapping[str, float]:
-        """Touch, where the film is thinnest."""
-        return {"d_m": 0.0}
+    peaks: ClassVar[Mapping[str, float]] = {"d_m": 0.0}
+    """Touch, where the film is thinnest."""
 
     def conductance(
         self,
@@ -279,10 +277,8 @@ class Roelands(Property):
     Z: float = parameter("1", "index of the pressure", default=0.0, at_least=0)
     S_0: float = parameter("1", "index of the temperature", default=0.0, at_least=0)
 
-    @property
-    def limits(self) -> Mapping[str, tuple[float, float]]:
-        """The pole of the formula."""
-        return {"T_c": (138.0, math.inf)}
+    limits: ClassVar[Mapping[str, tuple[float, float]]] = {"T_c": (138.0, math.inf)}
+    """The pole of the formula."""
 
     def value(self, T_c: Expression, p: Expression, T_0: Expression) -> Expression:
         """Viscosity [Pa s]."""

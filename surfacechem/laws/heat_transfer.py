@@ -84,10 +84,8 @@ class GapConductance(HeatTransfer):
     epsilon_1: float = parameter("1", "emissivity of the first end", above=0, at_most=1)
     epsilon_2: float = parameter("1", "emissivity of the second end", above=0, at_most=1)
 
-    @property
-    def peaks(self) -> Mapping[str, float]:
-        """Touch, beyond which the conductance of the contact spots decays within a short distance."""
-        return {"g_n": 0.0}
+    peaks: ClassVar[Mapping[str, float]] = {"g_n": 0.0}
+    """Touch, beyond which the conductance of the contact spots decays within a short distance."""
 
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
         """Contact spots, gas and radiation."""

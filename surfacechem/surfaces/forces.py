@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, optional, reads
 from surfacechem.errors import InputError
+from surfacechem.expressions import symengine
 from surfacechem.surfaces.inner_sums import (
     LAST_LEVEL,
     TRUNCATION_PART,
@@ -294,8 +295,6 @@ class Contact:
 
 def density(law: Potential | HeatTransfer) -> Callable[[Array], Array]:
     """Return value and slope of a law over the gap as machine code; InputError if it depends on anything else."""
-    import symengine
-
     foreign = [name for name in reads(law.statement) if name != GAP and name not in optional(law.statement)]
     varying = [name for name, _ in law.specs() if isinstance(getattr(law, name), Varying)]
     if foreign or varying:

@@ -27,7 +27,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import PairEnergy, Shape
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression
+from surfacechem.expressions import Expression, symengine
 from surfacechem.surfaces.projection import FIRST_ORDER, POLE, Array, Projection, Surface
 from surfacechem.surfaces.shapes import Cavity, Cylinder, Indices, Plane, Sphere
 from surfacechem.tolerances import NEGLIGIBLE, TINY
@@ -362,16 +362,12 @@ FEWEST_TABULATED = 56
 @lru_cache(maxsize=64)
 def kernel(law: PairEnergy) -> Kernel:
     """Return the energy of a pair and its slope as machine code, (n, 2) for n distances."""
-    import symengine
-
     r = symengine.Symbol("r")
     return with_slope(law.energy(r), r)
 
 
 def with_slope(formula: Expression, symbol: Expression) -> Kernel:
     """Return a formula of one symbol and its slope as machine code, (n, 2) for n values of the symbol."""
-    import symengine
-
     value = symengine.sympify(formula)
     # Branches that would divide by zero are not taken.
     compiled: Kernel = symengine.Lambdify([symbol], [value, value.diff(symbol)], backend="llvm")

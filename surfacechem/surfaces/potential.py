@@ -21,7 +21,7 @@ import numpy as np
 from surfacechem.contracts.terms import HeatTransfer, Law, PairEnergy, Potential, Shape, option
 from surfacechem.documents.cache_folder import PACKAGE, Fingerprint, cached, fingerprint
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, derivative
+from surfacechem.expressions import Expression, derivative, symengine
 from surfacechem.surfaces.approach import ApproachEnergy, fitted, straight
 from surfacechem.surfaces.forces import (
     GAP,
@@ -175,8 +175,6 @@ class CurvedSurfaces(Potential):
     @cached_property
     def strongest(self) -> float:
         """Approach at which the tension is largest [m]."""
-        import symengine
-
         g = symengine.Symbol("g_n")
         force = symengine.Lambdify([g], [derivative(self.energy(g), g)])
         low, high = self.approach

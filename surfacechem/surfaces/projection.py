@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.contracts.terms import Shape
+from surfacechem.expressions import symengine
 from surfacechem.surfaces.shapes import Indices, Sphere
 from surfacechem.tolerances import CLOSED_GUARD, EQUAL, FEW_EPS, TINY, ULPS
 
@@ -45,8 +46,6 @@ AREA_ALONE = 0
 @lru_cache(maxsize=64)
 def _compiled(shape: Shape, count: int) -> Callable[[Array], Array]:
     """Return the point of a shape with its derivatives, or its area per parameters, as machine code."""
-    import symengine
-
     u, v = symengine.symbols("u v")
     orders = [(i - j, j) for i in range(3) for j in range(i + 1)][: count or FIRST_ORDER]
     formulas: list[Any] = []

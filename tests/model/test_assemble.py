@@ -16,9 +16,8 @@ def test_every_component_that_has_a_place_states_something_in_a_phase():
 
 
 def test_many_starts_are_checked_without_compiling(monkeypatch):
-    """Code for a bound of rounding took seconds for a limit of many terms, longer than all the runs."""
     system = assemble.assemble(scenes.coupled())
     limits, numbers = assemble.StartLimits(system), np.array([item.at(0.0) for item in system.parameters])
     monkeypatch.setattr(symengine, "Lambdify", None)
-    for part in (1.0, 0.99, 0.98):
+    for part in (1.0, 0.99, 0.98):  # code for a bound of the rounding of many terms takes seconds
         limits.check(part * system.initial_state(system.given_values), numbers)

@@ -1,6 +1,7 @@
 """Exact solutions of bonds under force against their tables (30 digits), and in ranges where exponentials overflow."""
 
 import math
+from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -114,12 +115,8 @@ def test_springs_in_equilibrium():
     film = build("lattice-gas-springs", data.parameters, epsilon=data.parameters["eps"])
     # The exponent is 14 and more, and its rounding is that of the bonding state.
     assert_exact(film.equilibrium(data.columns["g"]), data.columns["phi_eq"])
-
-
-@pytest.mark.parametrize("epsilon", [-1e-17, -1e-19, 1e-19, 1e-17, 1e-15])
-def test_springs_of_any_energy(epsilon):
-    film = get("lattice-gas-springs")(n_c=1e16, epsilon=epsilon, k_b=1e-3, T=300.0, g_n=1e-9)
-    assert 0 <= film.equilibrium(1e-9) <= 1
+    for epsilon in (-1e-17, -1e-19, 1e-19, 1e-17, 1e-15):
+        assert 0 <= replace(film, epsilon=epsilon).equilibrium(1e-9) <= 1
 
 
 def test_springs_relax_at_a_held_gap():

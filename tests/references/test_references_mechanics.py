@@ -145,8 +145,7 @@ class TestCohesion:
         w_off = get("cohesive-pull-off")(**ZONE, k=1e13, w_dot=0.0).folds[0].w
         gap = get("overdamped-pull-off")(**ZONE, k=1e13, c=2e5, delta_w=w_off * float(row["w_over_woff_minus_1"]))
         assert gap.time(4e-8) == pytest.approx(row["t"], rel=1e-13)
-        asymptotic = math.pi * gap.c * gap.width / (gap.k * gap.delta_w)
-        assert asymptotic == pytest.approx(row["t_asymptotic"], rel=1e-13)
+        assert math.pi * gap.c * gap.width / (gap.k * gap.delta_w) == pytest.approx(row["t_asymptotic"], rel=1e-13)
         reached = gap.solution(gap.time(4e-8))
         # In the bottleneck a rounding of time is a small distance; beyond it, it is the speed.
         assert reached["g_n"] == pytest.approx(4e-8, rel=1e-13 + 8 * EPS * gap.time(4e-8) * reached["v_n"] / 4e-8)

@@ -37,6 +37,7 @@ class Direction:
     """A direction along the interface, with the names of its variables."""
 
     axis: str
+    displacement: str
     velocity: str
     cosine: str
     """Name of the component of the slip direction."""
@@ -44,13 +45,9 @@ class Direction:
     total: str
     text: str
 
-    @property
-    def displacement(self) -> str:
-        return f"u_{self.axis}"
 
-
-ALONG = Direction("t", "v", "direction", "t", "t_t", "tangential traction")
-ACROSS = Direction("t2", "v_2", "direction_2", "t_2", "t_t2", "transverse traction")
+ALONG = Direction("t", "u_t", "v", "direction", "t", "t_t", "tangential traction")
+ACROSS = Direction("t2", "u_t2", "v_2", "direction_2", "t_2", "t_t2", "transverse traction")
 
 SLIDING_TRACTIONS = (ALONG.total, ACROSS.total)
 """Tractions along the interface, which a stage may wait for even if no law reads them."""

@@ -69,12 +69,6 @@ class Opposed:
             return None
         return forward[0].stoichiometry(), x_f - x_r
 
-    @property
-    def title(self) -> str:
-        """The reaction as a reversible equation."""
-        first = next(iter(self.forward.values()))
-        return first.title.replace(" => ", " <=> ")
-
 
 def opposed(laws: Mapping[str, RateLaw]) -> list[Opposed]:
     """Return the groups of one-way laws with a reverse; all laws with the same stoichiometry are in one group."""
@@ -100,7 +94,8 @@ def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> Ite
         for laws in (group.forward, group.backward)
     )
     affinity = sum(n * mu[name] for name, n in group.change.items())
-    yield _departure(build, group.label, f"{group.title} (pair)", forward - backward, affinity)
+    title = next(iter(group.forward.values())).title.replace(" => ", " <=> ")
+    yield _departure(build, group.label, f"{title} (pair)", forward - backward, affinity)
 
 
 def own_departure(build: Build, label: str, law: RateLaw, affinity: Expression) -> Iterator[RatePair]:

@@ -59,15 +59,13 @@ def variables(build: Build) -> Iterator[Thermal]:
 
 def _with_member(build: Build, thermal: Thermal, variable: str, temperature: str | Load, member: str) -> Thermal:
     """Return the nodes with that of one more member, which may share the node of another member."""
-    own = temperature if isinstance(temperature, Load) else None
-    name = variable if isinstance(temperature, Load) else temperature
-    message = ""
+    name, own = (variable, temperature) if isinstance(temperature, Load) else (temperature, None)
+    path = f"{member}.temperature" if member == INTERFACE else f"bodies.{member}.temperature"
     if own is not None and name in thermal.nodes:
         message = f"{name} has two roles: the temperature of {member}, and a node of another member."
-    elif name == "T_0" or not re.fullmatch(r"T\w*", name, re.ASCII):
+        raise InputError(message, path=path)
+    if name == "T_0" or not re.fullmatch(r"T\w*", name, re.ASCII):
         message = f"'{name}' cannot name a temperature: use T, followed by letters, digits or _, but not T_0."
-    if message:
-        path = f"{member}.temperature" if member == INTERFACE else f"bodies.{member}.temperature"
         raise InputError(message, path=path)
     node = thermal.nodes.get(name)
     if node is None:
