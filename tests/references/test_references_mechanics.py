@@ -18,12 +18,8 @@ EPS = np.finfo(float).eps
 FRICTION = {"m": 10.0, "k": 1e8, "t_s": 6e4, "t_k": 4e4}
 REBONDING = {"m": 10.0, "k": 1e8, "p": 1e5, "mu_b": 0.7, "mu_ub": 0.4, "mu_k": 0.4, "tau": 2.0}
 ZONE = {"t_max": 1e6, "g_0": 1e-8}
-CALLED = {
-    "t_first_onset": "onset_time",
-    "v_max": "slip.v_max",
-    "slip_time": "slip.duration",
-    "slip_distance": "slip.distance",
-}
+SLIP = {"v_max": "slip.v_max", "slip_time": "slip.duration", "slip_distance": "slip.distance"}
+CALLED = {"t_first_onset": "onset_time", **SLIP}
 """What columns of tables are called here, where it differs."""
 
 
