@@ -213,23 +213,20 @@ class AutonomousODE:
             time = self._slowness(start, point, from_end) @ self.weights
             return time, np.abs(stop - start) / self._rate(point, from_end)
 
-        target = np.minimum(t, end) - self.times[j]
-        guess = self._guess(target, self.slowness[j])
+        target, slowness = np.minimum(t, end) - self.times[j], self.slowness[j]
+        # The first guess of the share of a panel is of cubics between its Gauss points.
+        times, row, shares = slowness @ _running_weights().T, np.arange(len(t)), 0.5 * (1.0 + self.nodes)
+        right = np.clip((times < target[:, None]).sum(axis=1), 1, GAUSS_POINTS - 1)
+        left = right - 1
+        with np.errstate(all="ignore"):
+            slopes = 0.5 / slowness[row, left], 0.5 / slowness[row, right]
+            guess = hermite(target, (times[row, left], times[row, right]), (shares[left], shares[right]), slopes)
+        guess = np.where(target > 0.0, np.nan_to_num(guess), 0.0)
         ends, rounding = (np.zeros_like(target), np.ones_like(target)), FEW_EPS * np.minimum(t, end)
         share = increasing_root(elapsed, target, *ends, guess, *panels, rounding=rounding)
         distance = np.where(t < end, start + share * (stop - start), 0.0)
         rest = self.length - distance
         return np.where(from_end, rest, distance), np.where(from_end, distance, rest)
-
-    def _guess(self, t: Array, slowness: Array) -> Array:
-        """Return the shares of panels covered at times since their starts, by cubics between Gauss points."""
-        times, row = slowness @ _running_weights().T, np.arange(len(t))
-        right = np.clip((times < t[:, None]).sum(axis=1), 1, GAUSS_POINTS - 1)
-        left, shares = right - 1, 0.5 * (1.0 + self.nodes)
-        with np.errstate(all="ignore"):
-            slopes = 0.5 / slowness[row, left], 0.5 / slowness[row, right]
-            guess = hermite(t, (times[row, left], times[row, right]), (shares[left], shares[right]), slopes)
-        return np.where(t > 0.0, np.nan_to_num(guess), 0.0)
 
 
 @cache

@@ -158,10 +158,18 @@ def pair_traction(
     InputError if the sums over the other surface take more than a ``budget``, in which each slice of points is an
     integral.
     """
-    found = np.zeros(len(x))
+    found, amounts = np.zeros(len(x)), np.array([law.n_1 * law.n_2 for law in laws])[:, None, None]
     for part in slices_of(len(x), inner):
-        forces = _forces_per_area(x[part], inner, laws, rtol, budget)
-        found[part] = np.einsum("nc,nc->n", forces, normals[part])
+        before = None
+        for level in range(1, LAST_LEVEL + 1):  # until two successive rules agree
+            sums, pairs = inner_sums(inner, x[part], laws, level, rtol)
+            budget.take(pairs)
+            forces = amounts * np.array([push for _, push in sums])
+            off = rtol * np.linalg.norm(forces, axis=-1)[..., None]
+            if before is not None and np.all(np.abs(forces - before) <= off):
+                break
+            before = forces
+        found[part] = np.einsum("nc,nc->n", forces.sum(axis=0), normals[part])
         budget.done += 1
     return found
 
@@ -170,19 +178,6 @@ def slices_of(count: int, inner: Surface) -> list[slice]:
     """Return slices of this number of points that are summed together."""
     together = count if is_round(inner.shape) else POINTS_AT_ONCE
     return [slice(begin, begin + together) for begin in range(0, count, together)]
-
-
-def _forces_per_area(x: Array, inner: Surface, laws: Sequence[PairEnergy], rtol: float, budget: Budget) -> Array:
-    """Return forces per area (n, 3) on points (n, 3), by rules of increasing level until two successive ones agree."""
-    before = None
-    for level in range(1, LAST_LEVEL + 1):
-        sums, pairs = inner_sums(inner, x, laws, level, rtol)
-        budget.take(pairs)
-        forces = np.array([law.n_1 * law.n_2 * push for law, (_, push) in zip(laws, sums, strict=True)])
-        if before is not None and np.all(np.abs(forces - before) <= rtol * np.linalg.norm(forces, axis=-1)[..., None]):
-            break
-        before = forces
-    return np.asarray(forces.sum(axis=0))
 
 
 def check_finite(lower: Surface, upper: Surface) -> None:

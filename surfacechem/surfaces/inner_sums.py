@@ -448,35 +448,31 @@ class SumsByGap:
 
     def at(self, gaps: Array) -> tuple[Array, int]:
         """Return the sums, and the number of pairs of points."""
-        r, height, area = self._circles(gaps)
-        sums = []
-        for law in self.laws:
-            psi, slope = np.moveaxis(kernel(law)(r), -1, 0)
-            # Energy, and force along the normal; tangential components cancel.
-            sums += [(psi * area).sum(-1), (-slope * area / r * height).sum(-1)]
-        return np.stack(sums, axis=-1), area.size
-
-    def _circles(self, gap: Array) -> tuple[Array, Array, Array]:
-        """Return circles around the feet: distances from the points, depths below these, and areas, each (n, k)."""
         bent = self.shape.bulge / self.shape.R if isinstance(self.shape, Sphere) else 0.0
         last = math.pi / abs(bent) if bent else math.inf
-        ends = [np.zeros_like(gap)]
+        ends = [np.zeros_like(gaps)]
         for kink in self.extent.kinks:
             # The circle on which the distance is that of a kink, from the law of cosines.
-            chord = np.sqrt(np.maximum(kink - gap, 0.0) * (kink + gap) / np.maximum(1 + bent * gap, TINY))
+            chord = np.sqrt(np.maximum(kink - gaps, 0.0) * (kink + gaps) / np.maximum(1 + bent * gaps, TINY))
             ends.append(2 / abs(bent) * np.arcsin(np.minimum(chord * abs(bent) / 2, 1)) if bent else chord)
         if math.isinf(self.extent.cutoff):
-            ends.append(np.minimum(gap * self.farther, last))
-        out = np.arcsinh(np.stack(ends[::-1], axis=1) / gap[:, None])
+            ends.append(np.minimum(gaps * self.farther, last))
+        gap = gaps[:, None]
+        out = np.arcsinh(np.stack(ends[::-1], axis=1) / gap)
         t, w = gauss_rule(divided(np.minimum.accumulate(out, axis=1)[:, ::-1], self.level), order_of(self.level))
-        gap = gap[:, None]
         s = gap * np.sinh(t)
         ds = w * np.hypot(gap, s)
         chord = 2 * np.sin(bent * s / 2) / bent if bent else s
         radius = np.sin(bent * s) / bent if bent else s
         # The law of cosines in terms of the chord, which does not cancel next to the foot.
         r = np.sqrt(gap**2 + (1 + bent * gap) * chord**2)
-        return r, gap + bent * chord**2 / 2, 2 * math.pi * np.abs(radius) * ds
+        # Depths below the points, and areas, of circles around the feet.
+        height, area, sums = gap + bent * chord**2 / 2, 2 * math.pi * np.abs(radius) * ds, []
+        for law in self.laws:
+            psi, slope = np.moveaxis(kernel(law)(r), -1, 0)
+            # Energy, and force along the normal; tangential components cancel.
+            sums += [(psi * area).sum(-1), (-slope * area / r * height).sum(-1)]
+        return np.stack(sums, axis=-1), area.size
 
 
 @lru_cache(maxsize=4096)

@@ -64,6 +64,8 @@ def near_places(
     nearest to a parabola. Minima that exceed the least gap by more than a grain may be omitted. InputError if the grid
     has too many points; ``take`` is called in advance with the cost in points.
     """
+    from scipy.spatial import KDTree
+
     sought = size * (1 + math.tan(min(abs(outer.shape.tilt) + abs(inner.shape.tilt), MOST_TURN)))
     low, high = np.nan_to_num(np.transpose(outer.shape.span), posinf=sought, neginf=-sought)
     grid = np.stack(np.meshgrid(*np.linspace(low, high, 9).T, indexing="ij"), axis=-1)
@@ -97,8 +99,11 @@ def near_places(
     at, gaps = _refined(outer, inner, gap, parameters(chosen), apart, extents.max(), noise)
     # Drop a pole that is not nearer than the point found from there.
     kept = ~poles | (gaps < gaps[-1] - noise)
-    at, gaps = at[kept], gaps[kept]
-    return _distinct(outer, at, gaps, SQRT_EPS * extents.max())
+    order = np.flatnonzero(kept)[np.argsort(gaps[kept], kind="stable")]
+    x = outer.derivatives(at[order], FIRST_ORDER)[0]
+    same = KDTree(x).query_pairs(SQRT_EPS * extents.max(), output_type="ndarray")
+    order = np.delete(order, same.max(axis=1)) if len(same) else order
+    return NearPlaces(at[order], gaps[order])
 
 
 def _near_grid(
@@ -213,14 +218,3 @@ def _nelder_mead(gap: Callable[[Array], Array], at: Array, steps: Array, bounds:
         size *= 1.0 if np.max(np.abs(best - at) / np.maximum(steps, POLE)) > size / 2 else ZOOM_FACTOR
         at = best
     return at, least
-
-
-def _distinct(outer: Surface, at: Array, gap: Array, near: float) -> NearPlaces:
-    """Return the points in order of the gap, without duplicates."""
-    from scipy.spatial import KDTree
-
-    order = np.argsort(gap, kind="stable")
-    x = outer.derivatives(at[order], FIRST_ORDER)[0]
-    same = KDTree(x).query_pairs(near, output_type="ndarray")
-    kept = np.delete(order, same.max(axis=1)) if len(same) else order
-    return NearPlaces(at[kept], gap[kept])

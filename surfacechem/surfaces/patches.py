@@ -486,9 +486,15 @@ def integral(
         deeper = worst & (within > over)
         halved = worst & ~deeper & (known.stalled | (known.level == LAST_LEVEL))
         raised = worst & ~deeper & ~halved
-        for mask, steps in ((deeper, (0, 1)), (raised, (1, 0))):
-            if mask.any():
-                _raise_level(rules, known, mask, steps)
+        for mask, level, changes in ((deeper, known.inside, known.within), (raised, known.level, known.over)):
+            if not mask.any():
+                continue
+            level[mask] += 1
+            finer = rules(known.patches[mask], known.level[mask], known.inside[mask])
+            if known.patches.first_level == FIRST_LEVEL:
+                changes[mask, 1] = changes[mask, 0]
+            changes[mask, 0] = finer - known.value[mask]
+            known.value[mask] = finer
         known.stalled[raised] = (known.level[raised] > FIRST_LEVEL) & (
             _largest(known.over[raised], size) * LEAST_GAIN > over[raised]
         )
@@ -523,18 +529,6 @@ def _start(rules: Rules, patches: Patches, level: Levels, inside: Levels, nested
     over = changes(1, 0)
     within = changes(0, 1) if nested else np.zeros_like(over)
     return PatchResults(patches, level.copy(), inside.copy(), value, over, within, np.zeros(len(level), dtype=bool))
-
-
-def _raise_level(rules: Rules, known: PatchResults, mask: NDArray[np.bool_], steps: tuple[int, int]) -> None:
-    """Raise the level of the rules over, or inside, some patches."""
-    known.level[mask] += steps[0]
-    known.inside[mask] += steps[1]
-    finer = rules(known.patches[mask], known.level[mask], known.inside[mask])
-    changes = known.over if steps[0] else known.within
-    if known.patches.first_level == FIRST_LEVEL:
-        changes[mask, 1] = changes[mask, 0]
-    changes[mask, 0] = finer - known.value[mask]
-    known.value[mask] = finer
 
 
 def _largest(changes: Array, size: Array) -> Array:

@@ -142,7 +142,11 @@ class Surface:
         size = np.linalg.norm(away, axis=-1)
         side = _dot(away, normal)
         # A point behind the surface but beyond an edge is next to the body, not inside it.
-        beyond, at_edge = self._beyond(at, away, D[1:3])
+        beyond, at_edge = np.empty((*at.shape[:-1], len(self.edges))), np.zeros(at.shape[:-1], dtype=bool)
+        for j, (k, edge, end) in enumerate(self.edges):
+            left, length = edge * (end - at[..., k]), np.linalg.norm(D[1 + k], axis=-1)
+            beyond[..., j] = np.where(left > POLE, -left * length, edge * _dot(away, D[1 + k]) / length)
+            at_edge |= left <= (POLE if self.shape.about_axis and edge < 0 else 0.0)
         gap = np.where((side < 0) & ~np.any(beyond > 0, axis=-1), -size, size)
         off = (at_edge & (size > 0))[..., None]
         direction = np.where(off, np.divide(away, gap[..., None], out=np.zeros_like(away), where=off), normal)
@@ -174,17 +178,6 @@ class Surface:
                 if not (pole or self.shape.closed[k] or math.isinf(end)):
                     found.append((k, side, end))
         return found
-
-    def _beyond(self, at: Array, away: Array, tangents: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the distances beyond each edge [m], (..., edges), of points that are ``away`` from their feet, and a
-        mask of the feet at an edge or a tip.
-        """
-        found, at_edge = np.empty((*at.shape[:-1], len(self.edges))), np.zeros(at.shape[:-1], dtype=bool)
-        for j, (k, side, end) in enumerate(self.edges):
-            left, size = side * (end - at[..., k]), np.linalg.norm(tangents[k], axis=-1)
-            found[..., j] = np.where(left > POLE, -left * size, side * _dot(away, tangents[k]) / size)
-            at_edge |= left <= (POLE if self.shape.about_axis and side < 0 else 0.0)
-        return found, at_edge
 
     def _search(self, places: Array, starts: Array) -> Array:
         """Return parameters (n, 2) of the closest points of some (n, 3) by Newton's method with halved steps."""

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import symengine
@@ -36,9 +37,20 @@ def variables(build: Build) -> Iterator[State]:
     """Define the properties of the medium, made when first read; yield the thickness of a film that grows."""
     found = build.interface.medium
     assert found is not None
-    _film(build, found)
+    thickness: Any
     if found.growth:
+        thickness, role, by = symengine.Symbol("d_m"), "evolved", f"{PATH}.growth"
         yield State(VARIABLES["d_m"], build.initial("d_m"), NANOMETRE)
+    elif found.thickness is None:
+        thickness, role, by = partial(build.variables.get, "g_n", "the medium", PATH), "derived", "the normal gap"
+    else:
+        spec, role, by = Spec("m", "thickness of the medium", above=0), "constant", f"{PATH}.thickness"
+        thickness = partial(build.constant, "d_m", by, spec, found.thickness)
+    build.variables.define("d_m", thickness, role, by)
+    if found.fluid is not None:
+        spec = Spec("Pa", "pressure of the medium", above=0)
+        pressure = partial(build.constant, "p_m", f"{PATH}.pressure", spec, found.fluid.pressure, internal=True)
+        build.variables.define("p_m", pressure, "constant", f"{PATH}.pressure")
     for name, value in found.properties.items():
         build.variables.define(name, partial(_given, build, name, value), "derived", f"{PATH}.{PROPERTY_KEYS[name]}")
     fluid = None if found.fluid is None else cache(partial(FluidFit, build, found.fluid))
@@ -66,23 +78,6 @@ def laws(build: Build) -> None:
 
 def _property(fluid: Callable[[], FluidFit], name: str) -> Expression:
     return fluid().property(name)
-
-
-def _film(build: Build, found: Medium) -> None:
-    if found.growth:
-        build.variables.define("d_m", symengine.Symbol("d_m"), "evolved", f"{PATH}.growth")
-    elif found.thickness is None:
-        build.variables.define(
-            "d_m", lambda: build.variables.get("g_n", "the medium", PATH), "derived", "the normal gap"
-        )
-    else:
-        spec = Spec("m", "thickness of the medium", above=0)
-        thickness = partial(build.constant, "d_m", f"{PATH}.thickness", spec, found.thickness)
-        build.variables.define("d_m", thickness, "constant", f"{PATH}.thickness")
-    if found.fluid is not None:
-        spec = Spec("Pa", "pressure of the medium", above=0)
-        pressure = partial(build.constant, "p_m", f"{PATH}.pressure", spec, found.fluid.pressure, internal=True)
-        build.variables.define("p_m", pressure, "constant", f"{PATH}.pressure")
 
 
 def _given(build: Build, name: str, value: float | Property) -> Expression:
@@ -194,7 +189,19 @@ class FluidFit:
             keys = [(f"{quantity}_{i}_{k}", f"{quantity}[{i}][{k}]") for k in range(len(piece.coefficients))]
             coefficients = [self._number(*key, c) for key, c in zip(keys, piece.coefficients, strict=True)]
             pieces.append(((2 * self.T - low - high) / (high - low), coefficients))
-        self._end_there(ends, fit)
+        low, high = fit[0].low, fit[-1].high
+        if (low, high) not in self.ranges:  # a run ends where a fit ends; most properties have the same range
+            self.ranges.add((low, high))
+            span = self.fluid.range(self.start)
+            fitted = f"the properties of {self.fluid.name} are fitted no further ({RANGE_REMEDY})"
+            beyond = (
+                span.reason_low if low == span.low else fitted,
+                span.reason_high if high == span.high else fitted,
+            )
+            margins = (self.T - ends[0], low, beyond[0]), (ends[-1] - self.T, high, beyond[1])
+            for margin, end, reason in margins:
+                name = f"{self.T} within the range of the fluid"
+                self.build.add(Margin(name, margin, f"{reason} at {self.T} = {end:.6g} K"))
         return ends, pieces, fit
 
     def _fit(self, quantity: str) -> tuple[Piece, ...]:
@@ -215,20 +222,6 @@ class FluidFit:
                 self.build.add(f"the {named} is known within {CRITICAL_ACCURACY:g} only {where} is not smooth.")
             return found
         raise AssertionError
-
-    def _end_there(self, ends: Sequence[Expression], fit: Sequence[Piece]) -> None:
-        """Add margins that end a run where a fit ends; most properties have the same range."""
-        low, high = fit[0].low, fit[-1].high
-        if (low, high) in self.ranges:
-            return
-        self.ranges.add((low, high))
-        span = self.fluid.range(self.start)
-        fitted = f"the properties of {self.fluid.name} are fitted no further ({RANGE_REMEDY})"
-        beyond = span.reason_low if low == span.low else fitted, span.reason_high if high == span.high else fitted
-        margins = (self.T - ends[0], low, beyond[0]), (ends[-1] - self.T, high, beyond[1])
-        for margin, end, reason in margins:
-            name = f"{self.T} within the range of the fluid"
-            self.build.add(Margin(name, margin, f"{reason} at {self.T} = {end:.6g} K"))
 
     def _number(self, symbol: str, key: str, value: float, spec: Spec = COEFFICIENT_SPEC) -> Expression:
         return self.build.constant(symbol, f"{FLUID_PATH}.{key}", spec, value, internal=True)

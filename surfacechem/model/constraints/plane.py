@@ -34,7 +34,7 @@ from surfacechem.expressions import Expression, absolute, cos, depends, derivati
 from surfacechem.model.automaton import ZERO, Constraint, Mode, Register
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components.formulation import PLACE, Formulation, evolve, growth, name_traction
-from surfacechem.model.components.mounting import ACROSS, Direction, FarField, far_field
+from surfacechem.model.components.mounting import Direction, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.system import END_PATH, STABLE_PREFIX, Given, Margin
 from surfacechem.quantities import VARIABLES
@@ -185,7 +185,11 @@ def _steady(build: Build, sides: Sequence[Component], largest: Expression) -> tu
     An ellipse of dry friction is stretched to a circle instead, for which the two balances decouple. The direction
     follows at once, so that it does not enter the stability condition on the speed.
     """
-    pull, sizes = [side.needed for side in sides], [_resistance(build, side) for side in sides]
+    pull, sizes = [side.needed for side in sides], []
+    for side, own in zip(sides, BEGAN, strict=True):  # the resistance to slip along each direction alone [Pa]
+        sliding = {b: symengine.Integer(b == own) for b in BEGAN} | {TURN: ZERO, SLIP: symengine.Integer(1)}
+        damping = (side.far.law.c_b + side.far.law.c_g) * SPEED
+        sizes.append(build.expanded(side.resisted).subs(sliding) + damping)
     (a, b), (n_x, n_y) = sizes, _unit_vector()
     ahead, aside = _turned(pull)
     along, across = ahead - (a + (b - a) * n_y**2), aside - (b - a) * n_x * n_y
@@ -259,13 +263,6 @@ def _elliptic(pull: Sequence[Expression], sizes: Sequence[Expression]) -> tuple[
     whole, double = reach * (reach + a * b), reach + along
     size = norm(x, y) * polynomial(SPEED, excess) / where(whole > 0, whole, 1)
     return size, polynomial(SPEED, across) / where(double > 0, double, 1)
-
-
-def _resistance(build: Build, side: Component) -> Expression:
-    """Return the resistance to slip along one of the directions alone [Pa]."""
-    own = BEGAN[side.d is ACROSS]
-    sliding = {b: symengine.Integer(b == own) for b in BEGAN} | {TURN: ZERO, SLIP: symengine.Integer(1)}
-    return build.expanded(side.resisted).subs(sliding) + (side.far.law.c_b + side.far.law.c_g) * SPEED
 
 
 def _scaled(sides: Sequence[Component], top: Expression) -> list[Expression]:

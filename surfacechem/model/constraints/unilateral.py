@@ -107,7 +107,7 @@ def impacts(build: Build) -> Iterator[Constraint]:
         return
     far = far_field(build, mount)
     speed, pressing = absolute(V), -far.force(ZERO, ZERO) / far.law.m
-    at_rest, remembered = _rest_condition(build, far, speed, pressing)
+    at_rest, remembered = _rest_condition(build, far, speed, pressing) if far.law.e != 0 else (ONE, {})
     yield from friction_impulse(build, (1 + far.law.e) * far.law.m * speed)
     hits = Edge(
         "impact",
@@ -128,8 +128,6 @@ def _rest_condition(
     build: Build, far: FarField, speed: Expression, pressing: Expression
 ) -> tuple[Expression, dict[Expression, Expression]]:
     """Return an indicator, one if the bodies do not rebound, else zero, and new values of the registers it reads."""
-    if far.law.e == 0:
-        return ONE, {}
     tolerance = build.constant("tolerance", RTOL_PATH, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
     swift = where(speed > FASTEST.symbol, speed, FASTEST.symbol)
     rebound = far.law.e * speed
