@@ -75,10 +75,9 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
     most = max(map(len, events))
     sizes = {**(axes or {}), "event": most}
 
-    def column(
-        name: str, unit: str, text: str, value: Callable[[EventRow], float | str], unset: Any = np.nan
-    ) -> Column:
-        table = np.full((len(runs), most), unset, dtype=object if unset == "" else float)
+    def column(name: str, unit: str, text: str, value: Callable[[EventRow], float | str]) -> Column:
+        # Texts have no unit.
+        table = np.full((len(runs), most), np.nan) if unit else np.full((len(runs), most), "", dtype=object)
         for row, own in zip(table, events, strict=True):
             row[: len(own)] = [value(event) for event in own]
         return Column(name, tuple(sizes), table.reshape(*sizes.values()), system.unit(unit), text)
@@ -87,8 +86,8 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
         return []
     columns = [
         column("event_time", "s", "time of the event", attrgetter("t")),
-        column("event_name", "", "name of the event", attrgetter("name"), ""),
-        column("event_reason", "", "what happened", attrgetter("reason"), ""),
+        column("event_name", "", "name of the event", attrgetter("name")),
+        column("event_reason", "", "what happened", attrgetter("reason")),
     ]
     if not any(run.jumps for run in runs):
         return columns
@@ -97,7 +96,7 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
         column("event_since", "s", "time since the transition before or the start", attrgetter("since")),
         column("event_released", "J/m^2", "energy turned into heat", attrgetter("released")),
         column("event_entropy", "J/(m^2 K)", "entropy produced", attrgetter("entropy")),
-        column("event_verdict", "", verdict, attrgetter("verdict"), ""),
+        column("event_verdict", "", verdict, attrgetter("verdict")),
     ]
     for name, state in system.own_states.items():
         q, k = state.quantity, system.state_columns[name]
