@@ -97,6 +97,19 @@ class ExternalInputs:
         return inputs
 
 
+_ONE_THREAD = threading.RLock()
+
+
+class compiled_once(cached_property[T]):  # noqa: N801 - a decorator
+    """A property that is compiled on first use, by one thread only: replaced machine code would be freed while tables
+    contain its address.
+    """
+
+    def __get__(self, owner: Any, kind: type[Any] | None = None) -> Any:  # type: ignore[override]
+        with _ONE_THREAD:
+            return super().__get__(owner, kind)
+
+
 @dataclass(frozen=True)
 class Lanes:
     """Code for eight cases at once: rates of states and accounts, and margins, from time, state, parameters and
@@ -113,15 +126,14 @@ class Lanes:
     nonzeros: frozenset[int] = frozenset()
     """Positions of those that may be nonzero."""
 
-    @cached_property
+    @compiled_once
     def step(self) -> "LaneFunction":
-        """The code of a linearly implicit step, compiled on first use by one thread only."""
+        """The code of a linearly implicit step."""
         from surfacechem.compile.rosenbrock import compile_step
 
         assert self.states is not None
         assert self.slopes is not None
-        with _ONE_THREAD:
-            return vars(self).get("step") or compile_step(self.states, self.slopes, self.nonzeros)
+        return compile_step(self.states, self.slopes, self.nonzeros)
 
 
 @dataclass(frozen=True)
@@ -143,8 +155,6 @@ MOST_OPTIMISED = 200
 """Number of expressions from which on they are not optimised: that takes ten times as long as generating their code,
 and makes it at most a quarter faster.
 """
-
-_ONE_THREAD = threading.RLock()
 
 MOST_RATE_STATES = 50
 """Number of states of a network above which a second function, of its rates, costs more time than any run gains."""
@@ -217,26 +227,20 @@ class Program:
         arrays = np.array(sizes, np.int64), np.array(code, np.int64), self.algebraic_mask, chains, self.nonzeros
         return *arrays, groups, np.array(self.divisors, np.bool_)
 
-    @cached_property
+    @compiled_once
     def rates(self) -> Function | None:
-        """The rates as functions of time, state and parameters, compiled on first use.
+        """The rates as functions of time, state and parameters."""
+        return self.solved()
 
-        By one thread only: replaced machine code would be freed while tables contain its address.
-        """
-        with _ONE_THREAD:
-            return vars(self).get("rates") or self.solved()
-
-    @cached_property
+    @compiled_once
     def lanes(self) -> Lanes | None:
-        """The code for eight cases at once, compiled on first use, also by one thread only."""
-        with _ONE_THREAD:
-            return vars(self).get("lanes") or self.laned(False)
+        """The code for eight cases at once."""
+        return self.laned(False)
 
-    @cached_property
+    @compiled_once
     def implicit_lanes(self) -> Lanes | None:
-        """The code for implicit steps of eight cases at once, compiled on first use, also by one thread only."""
-        with _ONE_THREAD:
-            return vars(self).get("implicit_lanes") or self.laned(True)
+        """The code for implicit steps of eight cases at once."""
+        return self.laned(True)
 
     def lane_tables(self, lanes: Lanes, linearly: bool) -> tuple[NDArray[Any], ...]:
         """Return the tables of a program for steps of eight cases at once: its sizes (states, accounts, margins, inputs

@@ -18,7 +18,7 @@ from llvmlite import ir
 
 from surfacechem.compile import PREPARATION
 from surfacechem.compile.objectcode import engine
-from surfacechem.compile.vectors import LANES, VECTOR, LaneFunction, by_vector, function_body, number, object_code
+from surfacechem.compile.vectors import LaneFunction, by_vector, entry, function_body, number, object_code
 from surfacechem.tolerances import EPS, LINEAR_RTOL
 
 _GIVEN = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
@@ -78,21 +78,18 @@ class _Step:
 
     # -- vectors ----------------------------------------------------------------------------------------------------
 
-    def _place(self, base: Any, row: int) -> Any:
-        return self.builder.gep(base, [ir.IntType(64)(8 * LANES * row)])
-
     def _load(self, base: Any, row: int, count: int) -> list[Any]:
-        places = (self.builder.bitcast(self._place(base, row + m), VECTOR.as_pointer()) for m in range(count))
-        return [self.builder.load(place, align=8) for place in places]
+        return [self.builder.load(entry(self.builder, base, row + m), align=8) for m in range(count)]
 
     def _store(self, base: Any, row: int, values: Iterable[Any]) -> None:
         for m, value in enumerate(values):
-            self.builder.store(value, self.builder.bitcast(self._place(base, row + m), VECTOR.as_pointer()), align=8)
+            self.builder.store(value, entry(self.builder, base, row + m), align=8)
 
     def _call(self, function: LaneFunction, row: int) -> list[Any]:
         """Call a function at the current inputs; return its results, which are stored from this row on."""
         code = self.builder.inttoptr(ir.IntType(64)(function.address), _FUNCTION.as_pointer())
-        self.builder.call(code, [self._place(self.out, row), self.inputs, self.user])
+        results = self.builder.bitcast(entry(self.builder, self.out, row), self.out.type)
+        self.builder.call(code, [results, self.inputs, self.user])
         return self._load(self.out, row, function.n_out)
 
     def _sum(self, total: Any, factors: Iterable[float], values: Iterable[Any]) -> Any:

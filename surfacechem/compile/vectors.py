@@ -75,9 +75,9 @@ def compile_lanes(inputs: Sequence[Any], expressions: Sequence[Any]) -> LaneFunc
     builder = function_body()
     places = {symbol: place for place, symbol in enumerate(inputs)}
     out, given, _ = builder.function.args
-    code = Code(builder, lambda symbol: builder.load(_entry(builder, given, places[symbol]), align=8), expressions)
+    code = Code(builder, lambda symbol: builder.load(entry(builder, given, places[symbol]), align=8), expressions)
     for number, value in enumerate(code.values):
-        builder.store(value, _entry(builder, out, number), align=8)
+        builder.store(value, entry(builder, out, number), align=8)
     builder.ret_void()
     held = engine(object_code(builder))
     return LaneFunction(int(held.get_function_address("f")), len(expressions), held)
@@ -178,7 +178,8 @@ class _Parts:
         return (_CONDITIONS.get(kind) or part.func)(*args)
 
 
-def _entry(builder: Any, argument: Any, place: int) -> Any:
+def entry(builder: Any, argument: Any, place: int) -> Any:
+    """Return a pointer to a vector of an argument."""
     pointer = builder.gep(argument, [ir.IntType(64)(8 * LANES * place)])
     return builder.bitcast(pointer, VECTOR.as_pointer())
 

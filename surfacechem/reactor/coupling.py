@@ -368,53 +368,55 @@ class HeatWall(cantera.Wall):
         self.interface = interface
 
 
-class BodyReservoir(NoFlow, cantera.Reservoir):
-    """A reservoir that represents a body: it takes heat through walls and nothing else."""
+class BodyPort(NoFlow, cantera.Reservoir):
+    """A body as a reservoir in the network: it has its present temperature, and takes heat through walls alone."""
 
     no_inlet = "would be lost: a body stores heat, not mass. Let it end in a reactor."
     no_outlet = "has no source: a body stores heat, not mass. Begin it in a reactor."
+    node: str
+    """Name of its temperature in the scene."""
+    heat_name: str
+    """Name of the heat that it takes there."""
+
+    @classmethod
+    def of(cls, name: str, node: str, heat_name: str) -> Self:
+        """Return the reservoir of a body."""
+        made = cls(cantera.Solution(yaml=RESERVOIR_YAML, name="body"), clone=False, name=name)
+        made.node, made.heat_name = node, heat_name
+        return made
 
     def _add_wall(self, wall: Any) -> None:
         if wall.velocity != 0.0 or wall.expansion_rate_coeff != 0.0:
-            refuse(wall, self.rigid())
+            refuse(wall, self._rigid())
         super()._add_wall(wall)
 
-    def rigid(self) -> str:
+    def _rigid(self) -> str:
         """Return the reason why a wall on it cannot move, with the remedy."""
         return (
             f"a wall on {self.name} moves, and its work would be lost: a body stores heat here, not volume. Leave out "
             "`velocity` and `K`, or put the moving wall between two gases."
         )
 
-
-class BodyPort:
-    """A body as a reservoir in the network, with its present temperature and the heat through its walls."""
-
-    def __init__(self, name: str, node: str, heat_name: str) -> None:
-        self.name, self.node, self.heat_name = name, node, heat_name
-        self.reservoir = BodyReservoir(cantera.Solution(yaml=RESERVOIR_YAML, name="body"), clone=False, name=name)
-
     def warm(self, temperature: float) -> None:
         """Set the temperature [K] that the walls see."""
         if temperature > 0:
-            self.reservoir.phase.TP = temperature, None
-            self.reservoir.syncState()
+            self.phase.TP = temperature, None
+            self.syncState()
 
     def heat(self) -> float:
         """Return the heat [W] that flows into the body through its walls."""
         heat = 0.0
-        for wall in self.reservoir.walls:
+        for wall in self.walls:
             if wall.expansion_rate != 0.0:
-                raise InputError(self.reservoir.rigid())
+                raise InputError(self._rigid())
             if wall.heat_flux != 0.0:
                 raise InputError(
                     f"a wall on {self.name} has a heat flux of its own, whose time is not known here. Give the wall U "
                     f"or an emissivity, or prescribe {self.heat_name} under `loading`."
                 )
-            heat += -wall.heat_rate if wall.left_reactor is self.reservoir else wall.heat_rate
+            heat += -wall.heat_rate if wall.left_reactor is self else wall.heat_rate
         return heat
 
     def others(self) -> list[Any]:
         """Return the reactors on the other sides of its walls."""
-        sides = ((wall.left_reactor, wall.right_reactor) for wall in self.reservoir.walls)
-        return [right if left is self.reservoir else left for left, right in sides]
+        return [wall.right_reactor if wall.left_reactor is self else wall.left_reactor for wall in self.walls]

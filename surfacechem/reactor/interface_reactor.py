@@ -241,13 +241,13 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
             node = node_of(case.scene, name)
             if node not in self.scene.states:
                 raise InputError(f"{node} stores no heat, so a wall cannot give it any. Put the wall on a body.")
-            port = BodyPort(name, node, f"Q_{suffix_of(case.scene, name)}")
+            port = BodyPort.of(name, node, f"Q_{suffix_of(case.scene, name)}")
             scene = EmbeddedScene(case, self.bodies, [*self.ports, name], self.loads, self.neighbours)
             self.ports[name] = port
             self._set_scene(scene)
             self.put(self.start())
             self._dated = True
-        return self.ports[name].reservoir
+        return self.ports[name]
 
     def load(self, name: str, function: Callable[[float], float] | float | str) -> None:
         """Set a load to a function of time [s] or a constant, in place of one that the case prescribes.
