@@ -147,7 +147,7 @@ def test_steps_looked_at_together_are_those_looked_at_one_by_one(solver, monkeyp
         np.testing.assert_array_equal(together[name], alone[name])
 
 
-@pytest.mark.parametrize("name", names[2:])
+@pytest.mark.parametrize("name", names)
 def test_kinks_at_zero_fire_with_others_where_a_segment_ends_and_only_there(name: str) -> None:
     """In the next segment the second guard is zero; where steps are repeated after a peak up to an event, none ends."""
     p, kinks = se.Symbol("p"), (Guard.restart(),) * 2
@@ -155,6 +155,7 @@ def test_kinks_at_zero_fire_with_others_where_a_segment_ends_and_only_there(name
     first = problem(program, [0.0], [0.0, 1.0], 1e-8, parameters=[1.0], margins=kinks)
     both = replace(first, segments=np.array([0.0, 1.0, 2.0]), parameters=np.array([[1.0], [0.0]]))
     events = solver(name).solve(both).events
-    assert (events.t.tolist(), events.index.tolist()) == ([1.0, 1.0], [0, 1])
+    assert events.index.tolist() == [0, 1]
+    assert events.t == pytest.approx([1.0, 1.0], rel=1e-15)
     program = scalar(DY - se.exp(-(((T - 0.9) / 0.05) ** 2)), margins=[1 - T, (T - 1) ** 2 + 1e-17])
     assert solver(name).solve(problem(program, [1.0], [0.0, 5.0], 1e-6, margins=kinks)).events.index.tolist() == [0]

@@ -151,7 +151,7 @@ class SteppingSolver(Solver):
     def solve(self, problem: Problem) -> Result:
         run, status = _Run(self, problem), Status.FINISHED
         for parameters, end in zip(problem.parameters, problem.segments[1:], strict=True):
-            run.enter(parameters, float(end))
+            run.view, run.end = View(problem, parameters, run.y), float(end)
             try:
                 status = run.through_segment()
             except NoStateError:
@@ -215,12 +215,11 @@ class _Run:
         """Counts of the library, and of its calls."""
         self.count, self.stepping = 0, 0.0
         """Steps, and time inside those of the library [s]."""
+        self.view: View
+        self.end: float
+        """End of the present segment [s]."""
         self.aim: float | None = None
         """Expected time of an event that the library's step has passed over: the next steps end there."""
-
-    def enter(self, parameters: Array, end: float) -> None:
-        """Begin a segment that ends at this time [s]."""
-        self.view, self.end = View(self.problem, parameters, self.y), end
 
     def through_segment(self) -> Status:
         """Integrate to the end of the segment, restarting the library after each event."""

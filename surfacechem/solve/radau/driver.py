@@ -8,7 +8,7 @@ from surfacechem.solve.contract import FITTED_PART, RETURN_FACTOR
 from surfacechem.solve.edges import find_magnitudes, jump, resolve
 from surfacechem.solve.radau.consistency import find_consistent
 from surfacechem.solve.radau.dense import finish_step, hold_rates, ledger_norm
-from surfacechem.solve.radau.guards import AT_START, find_event, mark_at_end, restore_sides, start_margins
+from surfacechem.solve.radau.guards import AT_START, find_event, mark_at_end, resolved, restore_sides, start_margins
 from surfacechem.solve.radau.linear import LARGE_MATRIX
 from surfacechem.solve.radau.newton import stage_count
 from surfacechem.solve.radau.outputs import is_within, write_interior, write_now, write_outputs
@@ -231,6 +231,8 @@ def _accept(w: Any, i: int, size: float, end: float, continued: bool) -> None:
     counts = w.counts[i]
     reached = w.base + (w.tau + size)
     whole = size == (end - w.base) - w.tau or reached >= end
+    # A step that ends just short of a kink at the end of the segment reaches the end, as far as time tells.
+    at_end = whole or end - reached <= resolved(w, size)
     times = w.times[row_of(w.times, i)]
     # The last outputs of an arc are those up to the end of its segment.
     shown = w.outputs_end - w.arc_start if whole and end == w.arc_end else end if whole else reached
@@ -243,8 +245,8 @@ def _accept(w: Any, i: int, size: float, end: float, continued: bool) -> None:
     _record(w, w.records[i], counts)
     if whole:
         w.tau = end - w.base
-        if w.n_margins > 0 and continued:
-            mark_at_end(w)
+    if at_end and w.n_margins > 0 and continued:
+        mark_at_end(w)
 
 
 @compiled

@@ -440,7 +440,7 @@ def _short_of(w: Any, h: float, m: int, size: float) -> float:
 
 
 @compiled
-def _resolved(w: Any, size: float) -> float:
+def resolved(w: Any, size: float) -> float:
     """Return the difference below which two times count as equal."""
     return float(NEWTON_EPS * abs(w.base + w.tau) + RUN_EPS * size)
 
@@ -452,7 +452,7 @@ def _mark_coincident(w: Any, h: float, size: float, first: int) -> bool:
     True if another than the first is well across: the polynomial was then too coarse to order them, as across an
     unknown kink.
     """
-    near, passed = _resolved(w, size), False
+    near, passed = resolved(w, size), False
     for m in range(w.n_margins):
         value, slope = w.margin[m], w.margin_slope[m]
         close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= noise(w, m)
@@ -507,7 +507,7 @@ def find_event(w: Any, h: float) -> float:
         w.fired[short] = 1
     # If a strict margin is not zero at the end, its dip was an artefact of the polynomial.
     left = w.margin[first] * w.side[first]
-    reached = left <= ALIKE_NOISE * noise(w, first) + abs(w.margin_slope[first]) * _resolved(w, size) / h
+    reached = left <= ALIKE_NOISE * noise(w, first) + abs(w.margin_slope[first]) * resolved(w, size) / h
     w.fired[first] = w.kinds[first, 3] == 0 or reached
     if w.fired[first] == 0 and not any_true(w.fired):
         update_sides(w)
