@@ -6,7 +6,7 @@ from hypothesis import settings
 
 # The first example of a test assembles and compiles its scene, so a deadline per example would measure that. Few
 # examples for each run of the tests: they are others the next time.
-settings.register_profile("surfacechem", deadline=None, max_examples=15)
+settings.register_profile("surfacechem", deadline=None, max_examples=10)
 settings.load_profile("surfacechem")
 
 # What tests share is kept to the end: at the usual rate a worker looks through all of it again and again.
