@@ -11,38 +11,25 @@ from functools import cache
 from types import ModuleType
 from typing import TypeVar
 
-from surfacechem.contracts.terms import (
-    BodyEnergy,
-    Factor,
-    FilmGrowth,
-    Friction,
-    HeatTransfer,
-    Law,
-    Limit,
-    Load,
-    PairEnergy,
-    Potential,
-    Property,
-    RateLaw,
-    Shape,
-)
+from surfacechem.contracts import terms
+from surfacechem.contracts.terms import Law
 from surfacechem.errors import LAWS, InputError, suggestion
 
 L = TypeVar("L", bound=type[Law])
 
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
-    BodyEnergy: ("free_energy",),
-    Potential: ("free_energy", "cohesive", "longrange", "films"),
-    RateLaw: ("kinetics", "cohesive"),
-    Friction: ("friction", "films"),
-    HeatTransfer: ("heat_transfer", "films"),
-    Limit: ("cohesive",),
-    Property: ("films",),
-    Load: ("loading",),
-    Factor: ("factors",),
-    Shape: ("shapes",),
-    PairEnergy: ("longrange",),
-    FilmGrowth: ("films",),
+    terms.BodyEnergy: ("free_energy",),
+    terms.Potential: ("free_energy", "cohesive", "longrange", "films"),
+    terms.RateLaw: ("kinetics", "cohesive"),
+    terms.Friction: ("friction", "films"),
+    terms.HeatTransfer: ("heat_transfer", "films"),
+    terms.Limit: ("cohesive",),
+    terms.Property: ("films",),
+    terms.Load: ("loading",),
+    terms.Factor: ("factors",),
+    terms.Shape: ("shapes",),
+    terms.PairEnergy: ("longrange",),
+    terms.FilmGrowth: ("films",),
 }
 """The modules that hold the laws of each contract."""
 

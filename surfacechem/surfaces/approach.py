@@ -195,7 +195,7 @@ def divided(
 ) -> list[tuple[float, float, Array]]:
     """Halve pieces until a polynomial fits the force on each; at a kink until they are too short to matter."""
     found: list[tuple[float, float, Array]] = []
-    waiting = list(pairwise(ends))[::-1]
+    waiting, place = list(pairwise(ends))[::-1], math.log if powers else float
     while waiting:
         sample.budget.integrals = len(sample.at) + len(waiting) * PIECE_SAMPLES
         a, b = waiting.pop()
@@ -204,18 +204,13 @@ def divided(
         coefficients = polynomial(sample, a, b, powers, rtol, least)
         if coefficients is not None:
             found.append((a, b, coefficients))
-        elif _extent(a, b, powers) > SHORTEST_PIECE * _extent(ends[0], ends[-1], powers):
+        elif place(b) - place(a) > SHORTEST_PIECE * (place(ends[-1]) - place(ends[0])):
             middle = approach_at(0.0, a, b, powers)
             # The lower half comes next, so that pieces are found in order.
             waiting += [(middle, b), (a, middle)]
         else:
             found.append((a, b, np.array([(value_at(sample, a, powers) + value_at(sample, b, powers)) / 2])))
     return found
-
-
-def _extent(a: float, b: float, powers: bool) -> float:
-    """Return the length between two approaches, or between their logarithms if powers are fitted."""
-    return math.log(b / a) if powers else b - a
 
 
 def value_at(sample: Samples, d: float, powers: bool) -> float:

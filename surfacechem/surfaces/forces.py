@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,10 +64,10 @@ INTEGRALS = 7
 class PairForces:
     """Energy [J], forces [N] and moments about the origin [N m] on both bodies, and the largest relative error of any.
 
-    With several laws all are arrays over them.
+    With several pair laws all are arrays over them.
     """
 
-    energy: Array
+    energy: Any
     force_1: Array
     force_2: Array
     moment_1: Array
@@ -267,25 +268,14 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
-class Contact:
-    """Result of the integrals over the gap.
-
-    Energy [J], forces [N] and moments about the origin [N m] on both bodies, area of touch or overlap [m^2], heat
-    conductance [W/K] and its slope over the approach [W/(K m)], least gap [m] and the number of places with it, and the
-    error relative to the size of each.
+class Contact(PairForces):
+    """Result of the integrals over the gap: also the area of touch or overlap [m^2], the heat conductance [W/K], and
+    its slope over the approach [W/(K m)].
     """
 
-    energy: float
-    force_1: Array
-    force_2: Array
-    moment_1: Array
-    moment_2: Array
     area: float
     conductance: float
     conductance_slope: float
-    gap: float
-    places: int
-    error: float
 
 
 def density(law: Potential | HeatTransfer) -> Callable[[Array], Array]:
@@ -432,12 +422,12 @@ def over_gap(
         flow = max(abs(found[14]), TINY)
         return np.array([*parts, area, flow, max(abs(found[15]), flow / size)])
 
-    whole, error, _ = integral(patches, integrand, upper.search, sizes, rtol, budget, nested=False)
+    whole, error, points = integral(patches, integrand, upper.search, sizes, rtol, budget, nested=False)
     _check_end(patches, Rules(integrand, upper.search, budget), sizes(whole))
     force_1, force_2, moment_1, moment_2 = np.split(whole[1:13], 4)
     energy, area, conductance, slope = map(float, whole[[0, 13, 14, 15]])
-    gap = float(near.gap[0])
-    return Contact(energy, force_1, force_2, moment_1, moment_2, area, conductance, slope, gap, near.count, error)
+    found = force_1, force_2, moment_1, moment_2, error, float(near.gap[0]), near.count, points
+    return Contact(energy, *found, area, conductance, slope)
 
 
 def _check_end(patches: Patches, rules: Rules, sizes: Array) -> None:
