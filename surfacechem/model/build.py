@@ -108,14 +108,6 @@ class Thermal:
 
 
 @dataclass(frozen=True)
-class HeatPath:
-    """A conductance [W/(m^2 K)] between two ends, in parallel with others between the same ends."""
-
-    ends: tuple[str, str]
-    h: Expression
-
-
-@dataclass(frozen=True)
 class Energy:
     """Free energy of the interface [J/m^2], and the part of the interface on which friction acts."""
 
@@ -164,7 +156,7 @@ class Motion:
     """Rates of the gaps that move by a balance."""
 
 
-Record = Thermal | Bond | Energy | HeatPath | State | Account | Margin | Constraint | Equilibrium | Power | Note | str
+Record = Thermal | Bond | Energy | State | Account | Margin | Constraint | Equilibrium | Power | Note | str
 """Records that components yield; a string is a warning."""
 
 
@@ -241,9 +233,6 @@ class Build:
                 self.bonding[str(record.symbol)] = record
             case Constraint():
                 self.constrain(record)
-            case HeatPath():
-                # Paths between the same two ends are in parallel: one node balance has their sum.
-                self.conductances.setdefault(record.ends, []).append(record.h)
             case _:
                 lists: dict[type, list[Any]] = {
                     State: self.states,

@@ -19,7 +19,7 @@ from surfacechem.contracts.terms import HeatTransfer
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, where
 from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, Node, Power
-from surfacechem.model.build import BOTH_BODIES, Build, HeatPath, Record
+from surfacechem.model.build import BOTH_BODIES, Build, Record
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
 from surfacechem.tolerances import NO_AMOUNT
@@ -36,7 +36,7 @@ def laws(build: Build) -> Iterator[Record]:
             for channel, h in channels.items():
                 together[channel] = together.get(channel, symengine.Integer(0)) + h
     for ends, channels in groups.values():
-        yield from (HeatPath(ends, h) for h in channels.values())
+        build.conductances.setdefault(ends, []).extend(channels.values())
         yield from (_into_both(build, channels) if ends == BOTH_BODIES else _between(build, ends, channels))
     for law in films:
         yield from _through_film(build, law)
@@ -100,7 +100,7 @@ def _two_nodes(build: Build, law: HeatTransfer) -> tuple[Node, Node]:
     return first, second
 
 
-def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power | HeatPath]:
+def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power]:
     r"""Yield the heat that a film with the mean temperature T_c gives to its walls.
 
     Across the film the temperature is a parabola on top of a line. With the resistances r of the film and :math:`r_k`
@@ -121,7 +121,7 @@ def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power | HeatPath]
     flows, produced = [], symengine.Integer(0)
     for end, node, wall, sign in zip(law.between, ends, (r_2, r_1), (1, -1), strict=True):
         h = 6 * (r + 2 * wall) / scale
-        yield HeatPath((INTERFACE, end), h)
+        build.conductances.setdefault((INTERFACE, end), []).append(h)
         text = f"heat flux from the film into {end}"
         flux = Quantity(_path_name(build, "interface", end), "W/m^2", text, tag="e:qc_k1")
         q = build.name(flux, build.stretch * (h * (centre.T - node.T) + sign * beside))
