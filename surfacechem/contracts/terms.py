@@ -636,12 +636,6 @@ class Shape(Law):
     def span(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Bounds of u and of v."""
 
-    @property
-    def lengths(self) -> list[float]:
-        """Radii, wavelengths or tubes [m]."""
-        given = [getattr(self, name) for name in self.radii]
-        return [value for value in given if value is not None]
-
     foot: ClassVar[Callable[..., Any] | None] = None
     """Parameters (..., 2) of the nearest point to each of the points (..., 3), if there is a closed form; one beyond
     the bounds is moved to the edge."""

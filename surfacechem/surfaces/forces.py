@@ -240,7 +240,8 @@ def length(lower: Surface, upper: Surface) -> float:
     # A closed parameter is an angle.
     ends = [end for s in shapes if not s.about_axis for end, closed in zip(s.span, s.closed, strict=True) if not closed]
     spans = [b - a for a, b in ends if np.isfinite(b - a)]
-    return float(max([*shapes[0].lengths, *shapes[1].lengths, *spans], default=1.0))
+    radii = [getattr(shape, name) or 0.0 for shape in shapes for name in shape.radii]
+    return float(max([*radii, *spans], default=0.0) or 1.0)
 
 
 def _sizes(found: Array, gap: float, reach: Array) -> Array:

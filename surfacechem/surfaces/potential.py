@@ -85,6 +85,9 @@ def curves_of(integrated: Callable[[], Sequence[ApproachEnergy]], *given: Any) -
     return INTEGRATED_CURVES[mark]
 
 
+CALLED = "`surface.approach`"
+"""Key of the range of approaches in a case."""
+
 JUMP_SAMPLES = 2000
 """Number of points between which a law is tested for jumps."""
 
@@ -113,6 +116,7 @@ class CurvedSurfaces(Potential):
     """Free energy [J] of two curved surfaces at the approach g_n, from laws of pairs of points and of the gap."""
 
     positive = ()
+    called = CALLED
 
     shapes: tuple[Shape, Shape] = option("shapes of body 1 and body 2")
     pairs: Sequence[PairEnergy] = option("laws of the distance of two points", default=())
@@ -125,11 +129,6 @@ class CurvedSurfaces(Potential):
     def limits(self) -> Mapping[str, tuple[float, float]]:
         """Range of approaches in which the energy is known."""
         return {"g_n": self.approach}
-
-    @property
-    def called(self) -> str:
-        """Key of this range in a case."""
-        return "`surface.approach`"
 
     def of_run(self, values: Mapping[str, float]) -> Self:
         """Return the surfaces with a run's numbers for the pair laws, by path."""
@@ -366,6 +365,8 @@ class CurvedSurfaces(Potential):
 class CurvedConductance(HeatTransfer):
     """Conductance [W/K] between two curved bodies at the approach g_n, from one per area over the gap."""
 
+    called = CALLED
+
     law: HeatTransfer = option("conductance per area, a law of the gap")
     pair: CurvedSurfaces = option("the two surfaces")
 
@@ -378,11 +379,6 @@ class CurvedConductance(HeatTransfer):
     def limits(self) -> Mapping[str, tuple[float, float]]:
         """Range of approaches in which the conductance is known."""
         return self.pair.limits
-
-    @property
-    def called(self) -> str:
-        """Key of this range in a case."""
-        return self.pair.called
 
     def surrogate(self) -> Self:
         """Return the law with a linear conductance in place of integrals."""
