@@ -210,6 +210,21 @@ def test_what_has_no_solution_is_refused(name, given, message):
         get(name)(**given)
 
 
+def test_a_root_that_is_settled_is_not_evaluated_again():
+    evaluated = []
+
+    def square(x, part):
+        evaluated.append(part.tolist())
+        return x**2, 2 * x
+
+    target = np.array([1.0, 2.0, 1e9])
+    found = increasing_root(square, target, np.ones(3), np.full(3, 1e5), None, np.arange(3))
+    assert found == pytest.approx(np.sqrt(target), rel=2e-16)
+    assert evaluated[0] == [0, 1, 2]
+    assert evaluated[1] == [1, 2]
+    assert evaluated[-1] == [2]
+
+
 @pytest.mark.parametrize("function", [lambda x: (x**0.1, 0.1 * x**-0.9), lambda x: (x + x**3, 1 + 3 * x**2)])
 def test_roots_close_to_each_other_are_found_to_rounding(function):
     """The values of one make the bracket of another narrow before that one is near it."""
