@@ -82,10 +82,10 @@ def _method(words: str, memory: Mapping[str, Any], module: str, function: str, *
     return LaneMethod(words, stepper.Loop(sources, f"{__package__}.{module}", function, brief=True), memory)
 
 
-EXPLICIT = _method("by explicit steps of order 8", EXPLICIT_MEMORY, "lane_run", "run_explicitly")
-_LINEARLY = "by linearly implicit steps of order 5", ROSENBROCK_MEMORY, "rosenbrock_lanes", "run_linearly"
+EXPLICIT = _method("explicit steps of order 8", EXPLICIT_MEMORY, "lane_run", "run_explicitly")
+_LINEARLY = "linearly implicit steps of order 5", ROSENBROCK_MEMORY, "rosenbrock_lanes", "run_linearly"
 ROSENBROCK = _method(*_LINEARLY, "radau_lanes", "rosenbrock_lanes")
-RADAU = _method("by Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "radau_lanes")
+RADAU = _method("Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "radau_lanes")
 
 
 def methods_of(problem: Problem) -> Iterator[LaneMethod]:
