@@ -292,7 +292,7 @@ def report(
     target = run_report.report_path(output or f"{Path(source).stem}.html")
     refuse_unwritable(target)
     solution = None if is_file else solve(load_case(source, changes).run, talk, brief=True)
-    solve(lambda: run_report.write(solution.dataset if solution else source, target), talk)
+    solve(lambda: run_report.write(solution.data if solution else source, target), talk)
     if talk is not False:
         typer.echo(str(target))
     if solution:

@@ -485,14 +485,16 @@ def recorded_plan(record: object) -> Plan:
 
 def split_arrays(over: Mapping[str, object]) -> tuple[dict[str, object], dict[str, Array]]:
     """Return the values as in a case, and separately numbers that are not read entry by entry: arrays, ranges, and
-    columns of tables and datasets.
+    columns of tables and datasets. One that says its unit is a list of texts with that unit.
     """
     lists, arrays = dict(over), {}
     for path, values in over.items():
         if isinstance(values, Collection) and not isinstance(values, str | list | tuple | Mapping):
             array = np.asarray(values)
             lists[path] = array.tolist()
-            if array.ndim == 1 and array.dtype.kind in "iuf":
+            if said := getattr(values, "attrs", {}).get("units"):
+                lists[path] = [f"{value} {said}" for value in array.tolist()]
+            elif array.ndim == 1 and array.dtype.kind in "iuf":
                 lists[path], arrays[path] = [], array.astype(float)
     return lists, arrays
 

@@ -67,6 +67,8 @@ def _content(datasets: Sequence[Data], variables: Sequence[str] | None, against:
     if any("study" in dataset.attrs for dataset in datasets) or any(sweeps) != all(sweeps):
         raise InputError("a figure takes runs or sweeps, not both.")
     if not any(sweeps):
+        for dataset in datasets:
+            style.check_variables(dataset, {"time": ("time",)})
         return against or "time", _merge_panels([time_series.panels(each, variables, against) for each in datasets])
     axes = [*dict.fromkeys(tuple(sweep.axes_of(each)) for each in datasets)]
     if len(axes) > 1 or len(axes[0]) > 1:

@@ -337,10 +337,7 @@ def _draw_over(ax: Axes, dataset: Data, load: str, values: Array, scale: Callabl
     members = places[style.evenly_spread(len(places), MOST_CURVES)].tolist()
     notes = [f"{len(members)} of {modes.size} runs"] if len(members) < modes.size else []
     shown = np.array([values[tuple(place)] for place in members])
-    low, high = np.fmin.reduce(scale(shown)), np.fmax.reduce(scale(shown))
-    # Curves coincide if they nowhere differ by more than the width of their line, where they are known.
-    apart, range_ = np.fmax.reduce(high - low), np.fmax.reduce(high) - np.fmin.reduce(low)
-    if len(members) > 1 and apart * 72 * PANEL_HEIGHT <= LINE_WIDTH * range_:
+    if len(members) > 1 and _coincide(scale(shown)):
         ax.plot(x, np.fmin.reduce(shown), color="black", linewidth=LINE_WIDTH)
         notes.append("their curves coincide" if notes else "the curves of all runs coincide")
     else:
@@ -348,6 +345,13 @@ def _draw_over(ax: Axes, dataset: Data, load: str, values: Array, scale: Callabl
             ax.plot(x, curve, color=colour, linewidth=LINE_WIDTH, label=style.member_name(dataset, place))
     style.label_variable(ax.xaxis, dataset[load])
     ax.set_title(", ".join(notes), loc="right", **style.NOTE_STYLE)
+
+
+def _coincide(curves: Array) -> bool:
+    """True if curves nowhere differ by more than the width of their line, where they are known."""
+    low, high = np.fmin.reduce(curves), np.fmax.reduce(curves)
+    apart, range_ = np.fmax.reduce(high - low), np.fmax.reduce(high) - np.fmin.reduce(low)
+    return bool(apart * 72 * PANEL_HEIGHT <= LINE_WIDTH * range_)
 
 
 def _draw_series(ax: Axes, dataset: Data, load: str, name: str) -> None:

@@ -168,15 +168,15 @@ class Results(ABC):
             **({"mechanism": self.mechanism} if self.mechanism else {}),
         }
 
-    @cached_property
+    @property
     def data(self) -> Data:
-        """The dataset for figures and reports, without the imports of xarray."""
-        return Data.of_columns(self.columns, self.attributes)
+        """The dataset for figures and reports: that of xarray if it is there, as it may have been changed."""
+        return Data.of(self.dataset) if "dataset" in vars(self) else Data.of_columns(self.columns, self.attributes)
 
     @cached_property
     def dataset(self) -> xarray.Dataset:
         """The xarray Dataset."""
-        return self.data.to_xarray()
+        return Data.of_columns(self.columns, self.attributes).to_xarray()
 
     def __getitem__(self, name: str) -> xarray.DataArray:
         """Return a variable of the dataset by name; InputError if it has none of that name."""

@@ -129,7 +129,8 @@ class Data:
         """Return the variables of an xarray Dataset; values are read when they are asked for."""
         parts = {str(name): (str(name), tuple(map(str, v.dims)), v, v.attrs) for name, v in dataset.variables.items()}
         variables = {name: DataVariable(*part) for name, part in parts.items()}
-        return cls(variables, dataset.attrs, {*map(str, dataset.coords)}, str(dataset.encoding.get("source", "")))
+        coords = [name for name in variables if name in dataset.coords]
+        return cls(variables, dataset.attrs, coords, str(dataset.encoding.get("source", "")))
 
     @classmethod
     def made_of(cls, variables: Iterable[DataVariable], attributes: Mapping[str, Any], file: str = "") -> Data:
@@ -178,7 +179,9 @@ class Data:
         return name in self.variables
 
     def __getitem__(self, name: str) -> DataVariable:
-        """Return a variable or a coordinate."""
+        """Return a variable or a coordinate; of a dimension without one the numbers of its places."""
+        if name not in self.variables and name in self.sizes:
+            return DataVariable(name, (name,), np.arange(self.sizes[name]))
         return self.variables[name]
 
 

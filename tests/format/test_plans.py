@@ -106,6 +106,8 @@ def test_arrays_are_the_lists_of_their_numbers(bonding):
         assert plan.at(np.arange(plan.size))[K_0].tolist() == listed.at(np.arange(plan.size))[K_0].tolist()
         assert recorded_plan(plan.record).at(np.arange(plan.size))[K_0].tolist() == values.tolist()
     assert len(bonding.plan({K_0: np.linspace(1.0, 300.0, 100_000)}).record) < 200
+    celsius = xarray.DataArray([17.0, 27.0], attrs={"units": "degC"})
+    assert bonding.plan({"initial.T": celsius}).at(np.arange(2))["initial.T"].tolist() == [290.15, 300.15]
     for wrong in (np.array([1.0, np.nan]), np.array([1.0, np.inf, 2.0]), np.array([]), np.ones(2), np.ones((2, 1))):
         with pytest.raises(InputError, match=K_0):
             bonding.plan({K_0: wrong})

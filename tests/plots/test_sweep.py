@@ -180,6 +180,10 @@ def test_effects_of_a_sample_in_memory_and_in_its_file(tmp_path):
         effects = plots.figure(dataset, ["T_max"]).axes[1:]
         assert [ax.get_xscale() for ax in effects] == ["log", "linear"]
         assert effects[1].get_xlabel().startswith("Initial")
+    counted = plots.figure(swept.dataset.drop_vars("time"), ["T"], "time")  # a dimension has at least its numbers
+    assert counted.axes[0].lines[0].get_xdata().tolist() == list(range(swept.dataset.sizes["time"]))
+    swept.dataset["T"] += 1000.0  # what a user changes is drawn
+    assert min(line.get_ydata()[0] for line in swept.plot(["T"], "time").axes[0].lines) > 1200.0
     assert set(xarray.open_dataset(file).coords) == set(swept.dataset.coords) == {"K_0", "initial_T", "time"}
 
 

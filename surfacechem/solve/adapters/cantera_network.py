@@ -319,6 +319,8 @@ class _Stretch(Method):
 
     @property
     def counters(self) -> Counters:
+        if self.last is None:  # Cantera complains of a network without a step
+            return Counters()
         told = self.net.solver_stats
         return Counters(
             residuals=int(told["rhs_evals"] + told["lin_rhs_evals"]),
