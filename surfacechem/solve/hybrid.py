@@ -330,11 +330,13 @@ def _points(arcs: Sequence[Arc], parts: Sequence[Points | None]) -> tuple[Array,
 
 def known_states(parts: Sequence[States], ends: Array) -> States:
     """Return all states of arcs that end at these times, in order of time, of those at one moment of an arc the first:
-    outputs, at exactly the requested times, come before others.
+    outputs, at exactly the requested times, which may lie behind the last step before a fold, come before others.
     """
-    t, y, ledger, segment = map(np.concatenate, zip(*parts, strict=True))
+    outputs, *others = parts
+    within = [rows._replace(t=np.minimum(rows.t, ends[rows.segment])) for rows in others]
+    t, y, ledger, segment = map(np.concatenate, zip(outputs, *within, strict=True))
     kept = in_order(t, segment)
-    return States(np.minimum(t[kept], ends[segment[kept]]), y[kept], ledger[kept], segment[kept])
+    return States(t[kept], y[kept], ledger[kept], segment[kept])
 
 
 def carried(problem: Problem, jumper: Jumper) -> Flow[tuple[Result, list[Jump], str] | None]:

@@ -78,7 +78,7 @@ class PairForces:
     places: int
     """Number of points at which they are as near."""
     pairs: int
-    """Pairs of points that were evaluated."""
+    """Pairs of points that were evaluated, or points whose gap was searched for."""
 
 
 def interaction(

@@ -13,7 +13,7 @@ from surfacechem.laws.factors import LinearInTemperature
 from surfacechem.laws.free_energy import BondEnergy, Constant, Penalty
 from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.loading import Hold, Ramp, Table
-from surfacechem.runs.simulation import Simulation
+from surfacechem.runs.simulation import Simulation, load
 from surfacechem.scene import Body, Interface, Mounting, Scene
 
 COLD = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
@@ -24,6 +24,14 @@ def slider(friction, mounting, drive, p=1e5, potentials=(), programme=(), **init
     loading = ({} if drive is None else {"w_t": drive}) | {"p": Hold(level=p)}
     interface = Interface(Hold(level=300.0), potentials, [friction])
     return Scene(COLD, interface, (), loading, None, 300.0, initial, programme=programme, tangential=mounting)
+
+
+def test_outputs_close_to_a_fold_are_among_the_known_states():
+    simulation = load("cohesive-pull-off")
+    (fold, *_) = (jump.t for jump in simulation.run().trajectory.jumps)
+    times = (0.0, *(fold * (1 - np.geomspace(1e-2, 1e-15, 60))).tolist(), simulation.case.run.times[-1])
+    result = simulation.run(run=replace(simulation.case.run, times=times, solver="lsoda")).trajectory.result
+    assert np.isin(result.times, result.known.t).all()
 
 
 # -- when and how often -----------------------------------------------------------------------------------------------

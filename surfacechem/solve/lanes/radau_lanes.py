@@ -61,7 +61,7 @@ POWER = 1.0 / (STAGES + 1.0)
 """Exponent of the size of a step: the estimate of s stages goes with h^(s+1)."""
 MOST_ITERATIONS = 9
 DIVERGED = (SAFETY / newton.SHORTENED) ** (1.0 / POWER)
-"""Norm assigned to a step without convergence: the next trial is newton.SHORTENED, as in single runs. If that fails
+"""Norm assigned to a step without convergence: the next trial is shortened as in single runs. If that fails
 too, the next ones have a tenth each.
 """
 EIGENVALUES = np.array([tables.GAMMA[MEMBER], *tables.PAIR_VALUES[MEMBER, :2]])
