@@ -46,9 +46,10 @@ window = surfacechem.load(
         }
     },
 )
-runs = (
-    window.stream(window.plan(), Path(tempfile.mkdtemp()) / "window.zarr").run().dataset
-)
+stream = window.stream(window.plan(), Path(tempfile.mkdtemp()) / "window.zarr")
+stored = stream.run()
+print("error", stream.check())
+runs = stored.dataset
 plots.figure(runs, ["time_to_phi", "T_max"], celsius=True)
 
 # %% [markdown]

@@ -56,7 +56,9 @@ window = surfacechem.load(
         }
     },
 )
-stored = window.stream(window.plan(), folder / "window.zarr").run()
+stream = window.stream(window.plan(), folder / "window.zarr")
+stored = stream.run()
+print("error", stream.check())
 plots.figure(stored.dataset, ["time_to_phi", "T_max"])
 
 # %% [markdown]
