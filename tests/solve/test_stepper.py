@@ -33,13 +33,22 @@ from surfacechem.solve.radau.solver import Dop853, Radau, consistent, put_rates
 from surfacechem.solve.radau.stepper import END, FIRST_COUNTER
 from surfacechem.solve.radau.tables import (
     COLLOCATION,
+    DEFECT,
     DENSE,
     EXPLICIT,
     EXPLICIT_ERRORS,
     EXPLICIT_NODES,
+    FROM_PARTS,
+    GAMMA,
     INVERSE,
+    NEWTON_NODES,
     NODES,
+    PAIR_VALUES,
+    SCAN_RATES,
+    SCAN_VALUES,
+    SCANNED,
     STAGES,
+    TO_PARTS,
 )
 
 radau = Radau()
@@ -57,6 +66,42 @@ def test_order_conditions(k: int) -> None:
     for q in range(1, 2 * s):
         assert a[-1] @ c ** (q - 1) == pytest.approx(1 / q, rel=1e-14)
     np.testing.assert_allclose(a @ INVERSE[k, :s, :s], np.eye(s), atol=1e-13)
+
+
+each_member = pytest.mark.parametrize("k", range(3))
+
+
+@each_member
+def test_parts_are_eigenvectors(k):
+    """The inverse of the collocation matrix in its real eigenbasis: a number and a rotation with growth each pair."""
+    s = STAGES[k]
+    blocks = np.zeros((s, s))
+    blocks[0, 0] = GAMMA[k]
+    for i, value in zip(range(1, s, 2), PAIR_VALUES[k], strict=False):
+        blocks[i : i + 2, i : i + 2] = [[value.real, -value.imag], [value.imag, value.real]]
+    found = FROM_PARTS[k, :s, :s] @ blocks @ -TO_PARTS[k, :s, :s]
+    np.testing.assert_allclose(found, INVERSE[k, :s, :s], rtol=1e-11, atol=1e-11)
+
+
+@each_member
+def test_scanned_points_lie_on_the_polynomial(k):
+    s, points = STAGES[k], SCANNED[k, : 4 * k + 9]
+    polynomial = np.poly1d([*np.random.default_rng(k).normal(size=s), 0.0])
+    stages = polynomial(NODES[k, :s])
+    rows = slice(len(points)), slice(s)
+    np.testing.assert_allclose(SCAN_VALUES[k][rows] @ stages, polynomial(points), rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(SCAN_RATES[k][rows] @ stages, polynomial.deriv()(points), rtol=1e-11, atol=1e-12)
+    assert np.all(np.diff(points) > 0)
+    assert list(SCAN_VALUES[k, len(points) - 1, :s]) == [0.0] * (s - 1) + [1.0]
+
+
+@each_member
+def test_the_scanned_correction_is_that_of_dense_output(k):
+    s, points = STAGES[k], SCANNED[k, : 4 * k + 9]
+    shape = DEFECT[k, s + 1]
+    for i in range(s, -1, -1):
+        shape = shape * (points - NEWTON_NODES[k, i]) + DEFECT[k, i]
+    np.testing.assert_allclose(SCAN_VALUES[k, : len(points), s], shape * points, atol=1e-12)
 
 
 def test_order_conditions_of_the_explicit_steps() -> None:
