@@ -290,8 +290,10 @@ corrections small however large the remaining error is.
 
 GOOD = -1
 """Outcome where a run may go on; others are numbers of a status."""
-FINISHED, EVENT, STEP_UNDERFLOW, MAX_STEPS, NONFINITE, *_OTHERS = map(int, Status)
-NO_CONSISTENT, SINGULAR, STOPPED, _, LEFT = _OTHERS
+FINISHED, EVENT = int(Status.FINISHED), int(Status.EVENT)
+STEP_UNDERFLOW, MAX_STEPS = int(Status.STEP_UNDERFLOW), int(Status.MAX_STEPS)
+NONFINITE, NO_CONSISTENT = int(Status.NOT_FINITE), int(Status.NO_CONSISTENT_STATE)
+SINGULAR, STOPPED, LEFT = int(Status.SINGULAR), int(Status.STOPPED), int(Status.LEFT)
 
 
 @compiled
