@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Self
@@ -60,8 +61,8 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
     """
 
     scene: EmbeddedScene
-    no_inlet = "has no volume to fill. Let it end in a reactor beside the interface."
-    no_outlet = "has no volume to come from. Let it begin in a reactor beside the interface."
+    no_inlet = "would be lost: an interface has no volume to fill. Let it end in a reactor beside it."
+    no_outlet = "has no source: an interface has no volume to come from. Let it begin in a reactor beside it."
     switches = {  # noqa: RUF012 - never changed
         "chemistry_enabled": (True, "Reactions stop with `phase.set_multiplier(0.0)`."),
         "energy_enabled": (True, "Hold temperatures in the case: `bodies: {lower: {temperature: 300 K}}`."),
@@ -126,13 +127,11 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
         self._connecting = True
         for body, reactor in self.bodies.items():
             # Through the wall the reactor supplies the heat that keeps the body at its temperature.
-            heat = lambda t, body=body: -float(self._rates_for_others(t)[self._accounts[body]])  # noqa: E731
-            self._walls.append(HeatWall(self, reactor, interface=self, A=self.area, Q=heat))
+            self._walls.append(HeatWall(self, reactor, interface=self, A=self.area, Q=partial(self._supplied, body)))
         self._connecting = False
         for k, neighbour in enumerate(self.neighbours.values()):
             if isinstance(neighbour, Receiver):
-                given = lambda t, k=k: self.scene.neighbours[k].given(self._rates_for_others(t), self.area)  # noqa: E731
-                neighbour.sources.append((self, given))
+                neighbour.sources.append((self, partial(self._given, k)))
 
     def __repr__(self) -> str:
         """Return title and states in a line."""
@@ -174,6 +173,14 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
         self._accounts = {body: scene.account(body) for body in self.bodies}
         """Indices of the variables that hold the heat of the bodies that reactors replace."""
         self.history = History(scene)
+
+    def _supplied(self, body: str, t: float) -> float:
+        """Return the heat [W/m^2] that the reactor in place of a body supplies at a time [s]."""
+        return -float(self._rates_for_others(t)[self._accounts[body]])
+
+    def _given(self, k: int, t: float) -> tuple[Array, float]:
+        """Return species [kmol/s] and enthalpy [W] that reactions give to a neighbour at a time [s]."""
+        return self.scene.neighbours[k].given(self._rates_for_others(t), self.area)
 
     def _add_wall(self, wall: Any) -> None:
         """Refuse a wall on this reactor, which consists of two bodies; Cantera calls it."""
@@ -341,9 +348,11 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
                 f"others have asked {self.name} for rates before Cantera has told it which of them it varies, so "
                 f"sensitivities would be wrong. Give {self.name} to the network before the reactors that take from it."
             )
+        if not self.passes_breakpoints:
+            self._check_segment(t)
         rates = np.asarray(self._rates(t) / self.unit)
         if not self.passes_breakpoints:
-            self._refuse_passed(t)
+            self._refuse_passed()
         self.evaluations += 1
         self.seconds += time.perf_counter() - began
         return rates
@@ -428,14 +437,18 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
         for item in self.scene.neighbours:
             yield from item.places
 
-    def _refuse_passed(self, t: float) -> None:
-        """Refuse a time beyond a breakpoint, or a state beyond an edge, that no network has carried out."""
-        passed_times = [each for each in self.scene.breakpoints if self.t < each < t]
-        if passed_times:
+    def _check_segment(self, t: float) -> None:
+        """Refuse a time beyond a breakpoint, where the equations are others."""
+        breakpoints = self.scene.breakpoints
+        following = bisect_right(breakpoints, self.t)
+        if following < len(breakpoints) and t > breakpoints[following]:
             raise InputError(
-                f"the loading has a breakpoint at t = {passed_times[0]:g} s, which an ordinary ReactorNet steps "
+                f"the loading has a breakpoint at t = {breakpoints[following]:g} s, which an ordinary ReactorNet steps "
                 "over. Use surfacechem.reactor.ReactorNet."
             )
+
+    def _refuse_passed(self) -> None:
+        """Refuse a state beyond an edge that no network has carried out."""
         if self.scene.events is None:
             return
         edges = self.scene.model.system.edges
