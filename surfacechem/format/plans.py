@@ -151,6 +151,10 @@ class Sample:
         u = SAMPLERS[self.method](own, self.runs, len(sources), self.seed)[where] + HALF_SPACING
         return {path: draw.at(u[:, sources.index(draw.source or path)]) for path, draw in self.draws.items()}
 
+    def of(self, path: str, index: Index) -> Array:
+        """Return the values of one parameter."""
+        return self.at(index)[path]
+
     @property
     def record(self) -> dict[str, Any]:
         """Entries from which the sample can be restored."""

@@ -330,8 +330,7 @@ def parameter_columns(system: System, plan: Plan, names: Mapping[str, str]) -> l
     columns = []
     sample, drawn = plan.sample, set(plan.sample.draws) if plan.sample else set()
     values = {axis.path: LazyArray(axis.at, len(axis)) for axis in plan.axes}
-    for path in drawn if sample else ():
-        values[path] = LazyArray(lambda index, path=path: sample.at(index)[path], sample.runs)  # type: ignore[misc, union-attr]
+    values |= {path: LazyArray(partial(sample.of, path), sample.runs) for path in drawn} if sample else {}
     for name, path in names.items():
         state = next((s for s in system.states if s.path == path), None)
         if state is not None:
