@@ -260,9 +260,10 @@ def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
         return unknown(ENDED_AT_START)
     if trajectory.status == "failed" and len(trajectory.result.times) < 2:
         return unknown(f"the run failed: {trajectory.reason}")
-    ends_late = second.result.t > trajectory.result.t
-    if second.status == "failed" or (second.status == "finished" and second.result.t < trajectory.result.t):
-        fate = "failed later" if ends_late else ENDED_EARLIER
+    earlier, later = sorted((second, trajectory), key=lambda each: each.result.t)
+    apart = later.result.t - earlier.result.t > RUN_ERROR * trajectory.run.rtol * trajectory.run.times[-1]
+    if second.status == "failed" or (apart and earlier.status == "stopped" != later.status):
+        fate = ENDED_EARLIER if earlier is second else f"{second.status} later"
         return unknown(f"a second run at rtol {other:.0e} {fate}: {second.reason}")
     seen = trajectory.stored
     errors, note = state_differences(seen, second)
@@ -615,9 +616,8 @@ def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
 
 def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     """Return the largest differences of two runs: of states, and of event times including an end set by physics."""
-    rtol = second.run.rtol
     if second.status == "failed":
-        return unknown(f"a second run at rtol {rtol:.0e} failed: {second.reason}")
+        return unknown(f"a second run at rtol {second.run.rtol:.0e} failed: {second.reason}")
     source = second_run(second.run)
     if first.status != second.status:
         return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")

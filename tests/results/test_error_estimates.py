@@ -170,20 +170,20 @@ def test_a_gap_that_touches_zero_for_a_moment_has_a_known_error(rtol):
     assert found.accuracy.error < 1e-13
 
 
-def test_a_second_run_that_ends_earlier_leaves_the_error_unknown():
-    simulation = surfacechem.load("exothermic")
-    trajectory = simulation.model.solve(simulation.case.run)
-    short = simulation.model.solve(replace(simulation.case.run, rtol=1e-13, times=(0.0, 1.0)))
-    accuracy = estimated(trajectory, short)
-    assert accuracy.source.startswith("unknown: a second run at rtol 1e-13 ended earlier")
-    assert np.isnan(accuracy.error)
-
-
-def test_a_second_run_that_fails_later_than_the_first_did_not_end_earlier():
-    simulation = surfacechem.load("exothermic")
-    first, second = (simulation.model.solve(replace(simulation.case.run, times=(0.0, 1.0, 2.0)[:n])) for n in (2, 3))
-    first, second = (replace(each, status="failed") for each in (first, second))
-    assert estimated(first, second).source.startswith("unknown: a second run at rtol 1e-11 failed later")
+@pytest.mark.parametrize(
+    ("first", "second", "fate"),
+    [
+        (("finished", 2.0), ("stopped", 1.0), "ended earlier"),
+        (("stopped", 1.0), ("finished", 2.0), "finished later"),
+        (("finished", 2.0), ("failed", 1.0), "ended earlier"),
+        (("failed", 1.0), ("failed", 2.0), "failed later"),
+    ],
+)
+def test_the_error_is_unknown_where_one_run_goes_on_beyond_the_end_of_the_other(stick_slip, first, second, fate):
+    runs = [(status, replace(stick_slip.case.run, times=(0.0, end))) for status, end in (first, second)]
+    found = estimated(*(replace(stick_slip.model.solve(run), status=status) for status, run in runs))
+    assert found.source.startswith(f"unknown: a second run at rtol 1e-11 {fate}")
+    assert np.isnan(found.error)
 
 
 @pytest.mark.parametrize("more", ["accuracy: 1e-6", "rtol: 1e-6"])
