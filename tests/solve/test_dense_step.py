@@ -104,6 +104,8 @@ def test_a_guard_that_jumps_right_after_no_time_is_found_there():
         ([1.0, 0.6, 0.9], True),
         ([1.0, 0.4, 0.9], False),  # it may touch zero in between
         ([1.0, 0.5, -0.1], False),
+        ([0.1, 0.18, 0.33], True),  # it grows
+        ([0.3, 0.2, 0.11, 0.2, 0.3], False),
         ([0.0, 0.0, 0.0], True),
         ([0.0, 0.1, 0.2], False),  # it leaves zero, to a side that is to be found
     ],
@@ -113,13 +115,12 @@ def test_guards_far_from_zero_follow_a_step_at_once(values, far):
     rows = np.array(values)[:, None]
     for each in (guards, stepwise):
         each.start(rows[0])
-    assert guards.far(rows[None, 1:], np.ones(1, bool)) == far
+    assert guards.far(rows[:, None], np.ones(1, bool)) == far
     if far:
         for row in rows[1:]:
             stepwise.follow(row)
-        assert [vars(guards)[name] for name in ("sides", "largest", "now")] == [
-            vars(stepwise)[name] for name in ("sides", "largest", "now")
-        ]
+        for name in ("sides", "largest", "now"):
+            assert vars(guards)[name] == vars(stepwise)[name]
 
 
 def test_a_polynomial_follows_from_its_derivatives_at_the_ends_of_a_step():
@@ -131,12 +132,10 @@ def test_a_polynomial_follows_from_its_derivatives_at_the_ends_of_a_step():
         nodes = start + (end - start) * NODES
         np.testing.assert_allclose(on_step(end, end - start, rows[k], nodes)[:, 0], power(nodes), atol=1e-12)
         np.testing.assert_allclose(at_nodes(rows)[k, :, 0], power(nodes[1:]), atol=1e-12)
-    one = [
-        DenseStep(*pair, partial(on_step, pair[1], pair[1] - pair[0], row))
-        for pair, row in zip(pairwise(times), rows, strict=True)
-    ]
+    pairs = zip(pairwise(times), rows, strict=True)
+    one = [DenseStep(*pair, partial(on_step, pair[1], pair[1] - pair[0], row)) for pair, row in pairs]
     for last in (2.25, 2.125):  # the second step is cut
-        nodes = np.array([0.5 + 1.5 * NODES[1:], 2.0 + (last - 2.0) * NODES[1:]])
+        nodes = np.array([0.5 + 1.5 * NODES[1:], 2.0 + (last - 2.0) * NODES[1:]]).T
         for steps in (Steps.of(one), Steps(times, one.__getitem__, at_nodes(rows))):
             np.testing.assert_allclose(steps.at_nodes(nodes)[:, 0], power(nodes.ravel()), atol=1e-12)
 

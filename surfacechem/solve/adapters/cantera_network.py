@@ -261,9 +261,7 @@ def last_step(net: Any, start: float, end: float) -> DenseStep:
     now, orders = float(net.time), np.arange(int(net.solver_stats["last_order"]) + 1)
     rows = np.array([net.get_derivative(k) for k in orders.tolist()]) / FACTORIALS[: len(orders), None]
 
-    def y(t: Any) -> Array:
-        return np.asarray(np.power.outer(t - now, orders) @ rows)
-
+    y = partial(on_step, now, 1.0, rows)
     return DenseStep(start, end, y, y)
 
 
@@ -278,37 +276,37 @@ class _Stretch(Method):
         self.longest = min(LONGEST_STEP * (end - t), view.problem.spacing)
         self.t, self.end = t, end
         self.net.max_time_step = self.longest
-        self.last: list[Array] | None = None
+        self.last: Array | None = None
         """Variables, in their units, and their first two derivatives after the last step."""
         self.failure: Exception | None = None
 
     def several(self, most: int) -> Steps:
-        reactor, step, derivative = self.reactor, self.net.step, self.net.get_derivative
-        times, found = [self.t], [*(self.last or [reactor.scaled.copy()])]
-        while len(times) <= most and self.t < self.end and self.failure is None:
+        state, step, derivative, end = self.reactor.scaled, self.net.step, self.net.get_derivative, self.end
+        times, ends = [self.t], np.empty((most + 1, 3, len(state)))
+        ends[0] = state if self.last is None else self.last
+        while len(times) <= most and times[-1] < end and self.failure is None:
             # Cantera has no stop time, and a step beyond the end would miss what changes there.
-            if self.end - self.t < self.longest:
-                self.net.max_time_step = max(self.end - self.t, FORMULA_EPS * self.end)
+            if end - times[-1] < self.longest:
+                self.net.max_time_step = max(end - times[-1], FORMULA_EPS * end)
             try:
-                now = step()
-                if not now > self.t:  # Cantera would go on, across a pole, too
+                now, row = step(), ends[len(times)]
+                if not now > times[-1]:  # Cantera would go on, across a pole, too
                     raise StepError("the step size fell to zero")
-                self.t, slopes = now, derivative(1)
+                row[0], row[1] = state, derivative(1)
                 try:
-                    curvatures = derivative(2)
-                except cantera.CanteraError:  # the first polynomial is a straight line
-                    curvatures = np.zeros_like(slopes)
-                found += reactor.scaled.copy(), slopes, curvatures
-                times.append(self.t)
+                    row[2] = derivative(2)
+                except cantera.CanteraError:
+                    row[2] = 0.0  # the first polynomial is a straight line
+                times.append(now)
             except (cantera.CanteraError, ArithmeticError, StepError) as error:
                 self.failure = error  # an event may lie before it
         if len(times) == 1:
             raise StepError(str(self.failure)) from self.failure
         if self.last is None:  # the first polynomial is a straight line
-            found[1:1] = found[2:4]
-        self.last = found[-3:]
-        rows = hermite(np.diff(times), np.concatenate(found).reshape(len(times), 3, -1) * reactor.unit)
-        return Steps(np.array(times), partial(self._step, times, rows), at_nodes(rows[..., : reactor.count]))
+            ends[0, 1:] = ends[1, 1:]
+        self.t, self.last = times[-1], ends[len(times) - 1]
+        rows = hermite(np.diff(times), ends[: len(times)] * self.reactor.unit)
+        return Steps(np.array(times), partial(self._step, times, rows), at_nodes(rows[..., : self.reactor.count]))
 
     def _step(self, times: Sequence[float], rows: Array, k: int) -> DenseStep:
         """Return a step between these times from the coefficients of its polynomial, with its ledger if any."""

@@ -56,13 +56,13 @@ class Steps:
         return lambda k: self.step(first + k)
 
     def at_nodes(self, times: Array) -> Array:
-        """Return the variables at these times of NODES except the first of each step; the last step may be cut."""
-        count = len(times)
+        """Return the variables at these times [node, step] of NODES except the first; the last step may be cut."""
+        count = times.shape[1]
         known = 0 if self.inside is None else count - bool(times[-1, -1] < self.times[count])
-        rows = [self.step(k).rows(times[k]) for k in range(known, count)]
+        rows = [self.step(k).rows(times[:, k])[:, None] for k in range(known, count)]
         if self.inside is not None:
-            rows.insert(0, self.inside[:known].reshape(-1, self.inside.shape[2]))
-        return np.concatenate(rows)
+            rows.insert(0, self.inside[:known].swapaxes(0, 1))
+        return np.concatenate(rows, axis=1).reshape(times.size, -1)
 
 
 @dataclass
@@ -130,19 +130,23 @@ class Guards:
         return self.due & (self._change_of_due(now) < -FORMULA_EPS * self.largest)
 
     def far(self, values: Array, active: NDArray[np.bool_]) -> int:
-        """Count the first steps in which no guard changes by as much as its distance from zero, and follow them.
+        """Count the first steps in which guards change by less than their distance from zero, and follow them.
 
-        ``values`` [step, point, guard] are those at some points of consecutive steps, the end of each last. Most guards
-        are bounds of states that stay far from them throughout a run.
+        ``values`` [point, step, guard] are those at some points of consecutive steps, from the start of each to its
+        end. Most guards are bounds of states that stay far from them throughout a run. One that moves one way only,
+        as a coverage that grows from nothing, may change by that much in a step if not from one point to the next.
         """
-        rows = np.empty((1 + values.shape[1], len(values), len(active)))  # reductions are fastest along the first axis
-        rows[0, 0], rows[0, 1:], rows[1:] = self.now, values[:-1, -1], values.swapaxes(0, 1)
-        rows[:, :, ~active] = 1.0
-        heights = np.where(active & (self.sides < 0.0), -rows, rows)
+        rows = np.where(active, values, 1.0)
+        heights = rows * np.where(active & (self.sides < 0.0), -1.0, 1.0)
         lowest, highest = heights.min(axis=0), heights.max(axis=0)
-        clear = (lowest > highest - lowest) & (~active | (self.sides != 0.0) & ~self.due) | ~rows.any(axis=0)
+        clear = lowest > highest - lowest
+        if not clear.all():
+            changes, nearer = np.diff(heights, axis=0), np.minimum(heights[1:], heights[:-1])
+            one_way = np.all(changes >= 0.0, axis=0) | np.all(changes <= 0.0, axis=0)
+            clear |= one_way & np.all(np.abs(changes) < nearer, axis=0)
+        clear = clear & (~active | (self.sides != 0.0) & ~self.due) | (lowest == 0.0) & (highest == 0.0)
         near = int(clear.argmin())
-        count = len(values) if clear.flat[near] else near // len(active)
+        count = len(clear) if clear.flat[near] else near // len(active)
         if count:
             self.largest = np.fmax(self.largest, np.where(self.sides == 0.0, 0.0, highest[:count].max(axis=0)))
             self.now = rows[-1, count - 1].copy()

@@ -166,7 +166,7 @@ class SteppingSolver(Solver):
 
 @dataclass(frozen=True)
 class _Inside:
-    """Variables at the quadrature points of consecutive steps, [step, node, ...]."""
+    """Variables at the quadrature points of consecutive steps, [node, step, ...]."""
 
     times: Array
     """Start of the first step and ends of all [s]."""
@@ -178,12 +178,12 @@ class _Inside:
 
     def part(self, first: int, end: int) -> "_Inside":
         """Return those of some of the steps."""
-        rows = (each[first:end] for each in (self.y, self.ydot, self.ledger, self.margins))
+        rows = (each[:, first:end] for each in (self.y, self.ydot, self.ledger, self.margins))
         return _Inside(self.times[first : end + 1], *rows)
 
     def integral(self, rates: Array) -> Array:
         """Return the integral of these rates over each step."""
-        return np.diff(self.times)[:, None] * (WEIGHTS[1:] @ rates[:, 1:] + WEIGHTS[0] * rates[:, 0])
+        return np.diff(self.times)[:, None] * sum(weight * row for weight, row in zip(WEIGHTS, rates, strict=True))
 
 
 class _Run:
@@ -278,13 +278,13 @@ class _Run:
             self.stepping += time.perf_counter() - before
             if not steps.times[1] > self.t:
                 raise StepError("the step size fell to zero")
-            if self.t == start:
-                self._check_first(steps.step(0), min(float(steps.times[1]), end))
             most = 1 if len(self.view.algebraic) else min(TOGETHER_GROWTH * most, MOST_TOGETHER)
             inside = self._inside(steps, min(float(steps.times[-1]), end))
+            if self.t == start:
+                self._check_first(inside)
             first, count = 0, len(steps.times) - 1
             while first < count:
-                margins = inside.margins[first:, 1:]
+                margins = inside.margins[:, first:]  # reductions are fastest along the first axis
                 far = self.guards.far(margins, self.active) if self.problem.margins else count - first
                 if far:
                     self._accept(steps.since(first), inside.part(first, first + far))
@@ -315,7 +315,7 @@ class _Run:
     def _accept(self, step: Callable[[int], DenseStep], inside: _Inside, fired: Sequence[int] = ()) -> None:
         """Move on to the end of these steps, and store their outputs and events."""
         # Copies, since a view would keep all nodes in memory.
-        times, y, ydot = inside.times, inside.y[:, -1].copy(), inside.ydot[:, -1].copy()
+        times, y, ydot = inside.times, inside.y[-1].copy(), inside.ydot[-1].copy()
         gains = inside.integral(inside.ledger)
         # Quadrature is the only value of accounts that the library does not integrate.
         relied = np.ones(len(y), bool) if step(0).ledger is None else self._adds_up(inside, NEGLIGIBLE)
@@ -348,7 +348,7 @@ class _Run:
             start, end = times[k : k + 2].tolist()
             ledger = ledgers[k + 1]
             if t < end:
-                gain = gained_at((t - start) / (end - start), inside.ledger[k]) * (end - start)
+                gain = gained_at((t - start) / (end - start), inside.ledger[:, k]) * (end - start)
                 ledger = ledgers[k] + (gain if relied[k] else self._gained(step(k), start, t, gain))
             row = np.concatenate((self._state(step(k), t)[0], ledger))
             if not np.all(np.isfinite(row)):
@@ -367,18 +367,17 @@ class _Run:
         """Evaluate the equations at the quadrature points of steps up to a time within the last of them."""
         view = self.view
         ends = np.concatenate(([self.t], steps.times[1:-1], [reached]))
-        times = ends[:-1, None] + np.diff(ends)[:, None] * NODES[1:]
-        times[:, -1] = ends[1:]
+        times = ends[:-1] + np.multiply.outer(NODES[1:], np.diff(ends))
+        times[-1] = ends[1:]
         x = y = steps.at_nodes(times)
-        if not self.solver.keeps_algebraic:
+        if len(view.algebraic) and not self.solver.keeps_algebraic:
             y = np.empty((len(x), len(self.y)))
             y[:, view.free], y[:, view.algebraic] = x, view.guess
-        rows = view.many(times.ravel(), y)
-        starts, found = (self.y, self.ydot, self.ledger_rates, self.margins), []
-        for start, each in zip(starts, rows, strict=True):
-            nodes = each.reshape(*times.shape, -1)
-            before = np.concatenate((start[None], nodes[:-1, -1]))
-            found.append(np.concatenate((before[:, None], nodes), axis=1))
+        starts, shape = (self.y, self.ydot, self.ledger_rates, self.margins), (len(NODES), len(ends) - 1)
+        found = []
+        for start, later in zip(starts, view.many(times.ravel(), y), strict=True):
+            rows = np.concatenate((start[None], later[-shape[1] : -1], later))  # ends of steps start others
+            found.append(rows.reshape(*shape, len(start)))
         return _Inside(ends, *found)
 
     def _state(self, step: DenseStep, t: float) -> tuple[Array, Array]:
@@ -394,14 +393,13 @@ class _Run:
         self.view.hold(t, *state, whole=not self.problem.program.plain_margins)
         return self.view.margins()
 
-    def _check_first(self, step: DenseStep, reached: float) -> None:
+    def _check_first(self, inside: _Inside) -> None:
         """Raise StepError if the first step is far longer than the transient it starts in.
 
         Such a step may end on another solution, which its error test does not detect.
         """
-        y, _ = self._state(step, reached)
-        moved = np.abs(self.ydot) * (reached - self.t)
-        seen = np.abs(self.y) + np.abs(y) + self.problem.atol
+        moved = np.abs(self.ydot) * (inside.times[1] - self.t)
+        seen = np.abs(self.y) + np.abs(inside.y[-1, 0]) + self.problem.atol
         if np.any((moved > LONGEST_FIRST * seen)[self.view.differential]):
             raise StepError("the first step is longer than the layer it starts in")
 
@@ -410,7 +408,7 @@ class _Run:
 
         It finds peaks inside a step, which a test at its end alone misses.
         """
-        starts, ends = inside.y[:, 0], inside.y[:, -1]
+        starts, ends = inside.y[0], inside.y[-1]
         missed = np.abs(inside.integral(inside.ydot) - (ends - starts))
         sizes = self.problem.rtol * np.maximum(np.abs(ends), np.abs(starts)) + self.problem.atol
         return np.asarray(np.all((missed <= factor * sizes)[:, self.view.differential], axis=1))
