@@ -60,9 +60,10 @@ app = typer.Typer(
 )
 
 
-def _version(wanted: bool) -> None:
+def tell_version(wanted: bool) -> None:
+    """Print the version and end, if wanted."""
     if wanted:
-        from importlib.metadata import version
+        from surfacechem.documents.cache_folder import version
 
         typer.echo(f"surfacechem {version('surfacechem')}")
         raise typer.Exit
@@ -70,7 +71,9 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def main(
-    version: Annotated[bool, Option("--version", callback=_version, is_eager=True, help="Print the version.")] = False,
+    version: Annotated[
+        bool, Option("--version", callback=tell_version, is_eager=True, help="Print the version.")
+    ] = False,
 ) -> None:
     """Contact interfaces that bond, slide, break and heat."""
 

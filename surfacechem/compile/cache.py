@@ -20,13 +20,11 @@ import sys
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from surfacechem.documents import cache_folder
-from surfacechem.documents.cache_folder import cache_root, keep_file, make_folder, sealed, unsealed
+from surfacechem.documents.cache_folder import cache_root, keep_file, make_folder, sealed, unsealed, version
 
 NUMBA_FILE = "kernel.numba"
 """File that Numba loads; other files of the folder that begin with `kernel.` contain the same code in other forms."""
@@ -40,10 +38,6 @@ PLATFORMS = {"x86_64": V3, "amd64": V3}
 """Target processors of such code, by machine name, with the instruction sets that they need; generic on other
 machines.
 """
-
-
-_version = cache(version)
-"""Version of a library, cached since the lookup is slow."""
 
 
 def processor() -> str:
@@ -109,7 +103,7 @@ def ship(sources: Sequence[Path], place: Path, load: Callable[[], object]) -> No
 
 def code_file(origins: Iterable[str]) -> Path:
     """Return the file for the machine code of expressions that follows from these texts on this machine."""
-    libraries = map(_version, ("symengine", "llvmlite"))
+    libraries = map(version, ("symengine", "llvmlite"))
     digest = hashlib.sha256("\n".join((*libraries, platform.machine(), processor(), *origins)).encode())
     return cache_root() / "code" / digest.hexdigest()[:32]
 

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts import fits
 from surfacechem.contracts.terms import Fluid, FluidRange
-from surfacechem.documents.cache_folder import cached, fingerprint
+from surfacechem.documents.cache_folder import cached, fingerprint, version
 from surfacechem.errors import InputError
 
 Array = NDArray[np.float64]

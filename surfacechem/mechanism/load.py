@@ -10,7 +10,6 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.metadata import version
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from typing import Any
 from surfacechem import documents as data
 from surfacechem.contracts.terms import Potential, RateLaw
 from surfacechem.documents import document
-from surfacechem.documents.cache_folder import PACKAGE, cache_root, fingerprint, from_file, source_digest
+from surfacechem.documents.cache_folder import PACKAGE, cache_root, fingerprint, from_file, source_digest, version
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.mechanism.evaluated import EvaluatedReaction, Neighbour, NeighbourReaction, SurfaceEngine, hold
 from surfacechem.mechanism.keys import PhaseCheck, has_neighbours, is_evaluated

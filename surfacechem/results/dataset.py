@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from surfacechem.documents.cache_folder import version
 from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
@@ -26,7 +27,6 @@ from surfacechem.results.netcdf import (
     Column,
     Data,
     dataset_path,
-    package_version,
     save,
     save_table,
 )
@@ -163,7 +163,7 @@ class Results(ABC):
             "Conventions": CONVENTIONS,
             "title": self.title,
             "source": self.source or "surfacechem",
-            "history": f"{made} by surfacechem {package_version('surfacechem')} {how}",
+            "history": f"{made} by surfacechem {version('surfacechem')} {how}",
             "case": self.case,
             **({"mechanism": self.mechanism} if self.mechanism else {}),
         }

@@ -14,7 +14,6 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from importlib.metadata import version
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
@@ -23,6 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.documents.cache_folder import version
 from surfacechem.errors import InputError, OutputError, Place, PlacedError, nearest
 
 if TYPE_CHECKING:
@@ -200,15 +200,9 @@ def cf_unit(unit: str) -> str:
     return " ".join(factors) or "1"
 
 
-@cache
-def package_version(name: str) -> str:
-    """Return the version of an installed package, read once per process."""
-    return version(name)
-
-
 def versions() -> str:
     """Return the versions of the packages on which a result depends."""
-    return ", ".join(f"{name} {package_version(name)}" for name in ("surfacechem", "numpy", "numba", "symengine"))
+    return ", ".join(f"{name} {version(name)}" for name in ("surfacechem", "numpy", "numba", "symengine"))
 
 
 def dataset_path(path: str | Path) -> Path:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, cached_property, partial
-from html import escape
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -137,6 +136,8 @@ class Simulation:
 
     def _repr_html_(self) -> str:
         """Return HTML for a notebook: title, unknowns, and the summary of ``check``."""
+        from html import escape
+
         from surfacechem.runs.check import warnings
         from surfacechem.runs.summaries import check_summary
 

@@ -28,7 +28,6 @@ from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from importlib.metadata import version
 from io import StringIO
 from itertools import product
 from pathlib import Path
@@ -37,6 +36,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from surfacechem.documents.cache_folder import version
 from surfacechem.errors import InputError, Place
 from surfacechem.quantities import raised
 from surfacechem.results.netcdf import CONVENTIONS, Column, Data, replacing, save
