@@ -84,6 +84,16 @@ class ChunkRuns:
         """Ways to compute runs as arrays, in the order in which they are tried; the rest is solved run by run."""
         self.arrays = arrays if self.solvers else None
 
+    @property
+    def record(self) -> tuple[str, str, str]:
+        """Plan, kept results and changes as text."""
+        return self.plan.record, json.dumps(asdict(self.keep)), json.dumps(dict(self.changes))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return the definition of the sweep, from which a worker computes any of its runs."""
+        case = self.simulation.case
+        return _runs_of, (case.name, case.text, case.mechanism_text, *self.record, self.run)
+
     @cached_property
     def lanes(self) -> lane_batch.LaneMethod | None:
         """The method by which eight runs are stepped at once; None if no runs are."""
@@ -179,31 +189,14 @@ def _put(columns: Columns, own: Index, found: Columns, count: int) -> None:
 # -- a sweep into a store ---------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Job:
-    """Definition of a sweep as text, from which a worker computes any of its runs."""
-
-    name: str
-    case: str
-    mechanism: str | None
-    plan: str
-    keep: str
-    changes: str
-    run: Run
-
-
 @lru_cache(maxsize=2)
-def _runs_of(job: Job) -> ChunkRuns:
+def _runs_of(name: str, text: str, mechanism: str | None, plan: str, keep: str, changes: str, run: Run) -> ChunkRuns:
+    """Return the runs of a sweep from their definition as text, in any process."""
     from surfacechem.runs.simulation import Simulation
 
-    case = cases.load_text(job.case, job.name, mechanism_text=job.mechanism, allow_code=True)
-    kept: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(job.keep).items()}
-    return ChunkRuns(Simulation(case), recorded_plan(job.plan), Keep(**kept), json.loads(job.changes), run=job.run)
-
-
-def columns_of(job: Job, index: Index) -> Columns:
-    """Compute the kept columns of some runs of a sweep, in any process."""
-    return _runs_of(job).columns(index)
+    case = cases.load_text(text, name, mechanism_text=mechanism, allow_code=True)
+    kept: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(keep).items()}
+    return ChunkRuns(Simulation(case), recorded_plan(plan), Keep(**kept), json.loads(changes), run=run)
 
 
 @dataclass(frozen=True)
@@ -223,7 +216,6 @@ class Stream:
 
     chunks: ChunkRuns = field(repr=False)
     store: Store
-    job: Job = field(repr=False)
     part: tuple[int, int] = (1, 1)
 
     @property
@@ -267,7 +259,7 @@ class Stream:
 
         def submit(part: Index) -> Any:
             if client:
-                return client.submit(columns_of, self.job, part, pure=False)
+                return client.submit(ChunkRuns.columns, self.chunks, part, pure=False)
             return pool.submit(self.chunks.columns, part)
 
         ahead = 2 * len(client.scheduler_info()["workers"]) if client else 1
@@ -331,20 +323,11 @@ def stream(
             raise InputError(message, path="sweep.keep")
     checked = plan.size if section.checked == ALL else int(section.checked)
     chunks = ChunkRuns(simulation, plan, keep, changes, checked)
-    job = Job(
-        case.name,
-        case.text,
-        case.mechanism_text,
-        plan.record,
-        json.dumps(asdict(keep)),
-        json.dumps(dict(changes)),
-        chunks.run,
-    )
-    store = begin(target, _layout(chunks, job), resume or part != (1, 1))
-    return Stream(chunks, store, job, part)
+    store = begin(target, _layout(chunks), resume or part != (1, 1))
+    return Stream(chunks, store, part)
 
 
-def _layout(chunks: ChunkRuns, job: Job) -> Layout:
+def _layout(chunks: ChunkRuns) -> Layout:
     """Return arrays, coordinates and attributes of the store of a sweep."""
     system, plan, keep = chunks.model.system, chunks.plan, chunks.keep
     names = sweeps.parameter_names(system, plan)
@@ -363,20 +346,21 @@ def _layout(chunks: ChunkRuns, job: Job) -> Layout:
         attributes = Column(name, (), None, q.unit, q.long_name).attributes
         variables[name] = StoredArray("float64", (*runs, "time"), attributes)
     more, beside = checked_arrays(plan.size, chunks.checked)
-    return Layout(sizes | more, runs, variables, beside, coordinates, _attributes(chunks, job), chunks.at_once)
+    return Layout(sizes | more, runs, variables, beside, coordinates, _attributes(chunks), chunks.at_once)
 
 
-def _attributes(chunks: ChunkRuns, job: Job) -> dict[str, Any]:
+def _attributes(chunks: ChunkRuns) -> dict[str, Any]:
     """Return the attributes of a store: the same for all writers, and none that changes with time."""
-    case = chunks.simulation.case
+    case, (plan, keep, changes) = chunks.simulation.case, chunks.record
+    texts = {"case": case.text, "mechanism": case.mechanism_text}
     return {
         "Conventions": CONVENTIONS,
         "title": case.title,
         "source": case.source or "surfacechem",
-        **{name: text for name in ("case", "mechanism") if (text := getattr(job, name))},
-        "sweep": job.plan,
-        "keep": job.keep,
-        "changes": job.changes,
+        **{name: text for name, text in texts.items() if text},
+        "sweep": plan,
+        "keep": keep,
+        "changes": changes,
         "run": json.dumps({**asdict(chunks.run), "times": list(chunks.run.times)}),
         "runs": chunks.plan.size,
         COORDINATES: " ".join(sweeps.parameter_names(chunks.model.system, chunks.plan)),
