@@ -11,7 +11,7 @@ Source: Evans & Ritchie (1997), Biophys. J. 72, 1541-1555, doi 10.1016/S0006-349
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import symengine
@@ -30,22 +30,6 @@ all bonds count as ruptured and a run ends.
 """
 
 MEDIAN_REASON, MODE_REASON = "half of the bonds are broken", "the density of ruptures is stationary"
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """Mode, median and mean of the load at rupture."""
-
-    mode: float
-    median: float
-    mean: float
-
-
-@dataclass(frozen=True)
-class Lifetime:
-    """Mean lifetime of the bonds of a run [s]."""
-
-    lifetime: float
 
 
 def history(system: System, variable: str) -> Expression:
@@ -154,36 +138,28 @@ def _total(system: System, expression: Expression) -> Expression:
     return total
 
 
-def statistics(trajectory: Trajectory, variable: str) -> Statistics:
-    """Return the statistics of a run of a system :func:`with_rupture`; NaN where the run does not determine them."""
+def statistics(trajectory: Trajectory, load: str) -> dict[str, float]:
+    """Return mode, median and mean of the ``load`` at rupture of a run of a system :func:`with_rupture`, or without a
+    load the mean lifetime of a run of a system :func:`with_lifetime`; NaN where the run does not determine them.
+    """
     model, result = trajectory.model, trajectory.result
     columns = model.system.output_columns
-    column, density = columns[variable], columns[f"density_{variable}"]
+    end = model.evaluate(result, np.array([result.t]), result.y[None], result.ydot[None])[0]
+    survivors = end[columns["survival"]]
+    kinds = [account.kind for account in model.system.ledger]
+    integral = float(result.ledger[kinds.index("statistics")])
+    if not load:
+        return {"lifetime": integral if survivors <= 1.01 * INTACT else math.nan}
+    column, density = columns[load], columns[f"density_{load}"]
     words = [*(margin.reason for margin in model.margins), *(item.reason for item in model.system.edges)]
     reasons = np.array(words)[result.events.index]
     at = model.evaluate(result, result.events.t, result.events.y, result.events.ydot)
-    end, integral = _at_end(trajectory, f"mean_{variable}")
-    survivors, halves = end[columns["survival"]], at[reasons == MEDIAN_REASON]
+    halves = at[reasons == MEDIAN_REASON]
     peaks = np.array([end, trajectory.outputs[0], *at[reasons == MODE_REASON]])
     peak = np.argmax(peaks[:, density])
-    return Statistics(
+    return {
         # Of a density that still grows at the end, with bonds left, the peak would come later.
-        mode=float(peaks[peak, column]) if peak or survivors < INTACT else math.nan,
-        median=float(halves[0, column]) if len(halves) else math.nan,
-        mean=float(trajectory.outputs[0, column] + integral) if survivors < INTACT else math.nan,
-    )
-
-
-def lifetime(trajectory: Trajectory) -> Lifetime:
-    """Return the mean lifetime of a run of a system :func:`with_lifetime`; NaN if too many bonds are left."""
-    end, integral = _at_end(trajectory, "lifetime")
-    survivors = end[trajectory.model.system.output_columns["survival"]]
-    return Lifetime(integral if survivors <= 1.01 * INTACT else math.nan)
-
-
-def _at_end(trajectory: Trajectory, account: str) -> tuple[Array, float]:
-    """Return the outputs at the end of a run, and an account of its ledger."""
-    result, system = trajectory.result, trajectory.model.system
-    end = trajectory.model.evaluate(result, np.array([result.t]), result.y[None], result.ydot[None])[0]
-    accounts = [item.quantity.name for item in system.ledger]
-    return end, float(result.ledger[accounts.index(account)])
+        "mode": float(peaks[peak, column]) if peak or survivors < INTACT else math.nan,
+        "median": float(halves[0, column]) if len(halves) else math.nan,
+        "mean": float(trajectory.outputs[0, column] + integral) if survivors < INTACT else math.nan,
+    }

@@ -7,7 +7,7 @@ import logging
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from typing import Any
 
@@ -43,11 +43,8 @@ from surfacechem.runs.keeping import (
     keep_of,
 )
 from surfacechem.runs.listing import counted
-from surfacechem.runs.spectrum import Lifetime, Statistics
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import EPS, LINE_ERROR
-
-Rupture = Statistics | Lifetime
 
 RESERVED_COLUMNS = ("time", RUN_DIMENSION, "species", "coverage", "error", "entropy_destroyed", "lifetime")
 """Names of dimensions and columns of sweeps that are not quantities."""
@@ -78,16 +75,18 @@ def prepared(system: System, plan: Plan) -> System:
     """
     if plan.until is None:
         return system
-    origin = partial(prepared, system, plan)
+    variable, target = plan.until
+    found = system
+    if plan.load:
+        spectrum.history(system, variable)
     if not plan.load:
-        return replace(spectrum.with_lifetime(system, plan.until[1]), origin=origin)
-    spectrum.history(system, plan.until[0])
-    if spectrum.breaks_bonds(system):
-        return replace(spectrum.with_rupture(system, plan.until[0]), origin=origin)
-    if spectrum.evolves_bonds(system):
+        found = spectrum.with_lifetime(system, target)
+    elif spectrum.breaks_bonds(system):
+        found = spectrum.with_rupture(system, variable)
+    elif spectrum.evolves_bonds(system):
         warning = "bonds can form again, so that their loss is no spectrum of rupture forces: none is given."
-        return replace(system, warnings=(*system.warnings, warning), origin=origin)
-    return replace(system, origin=origin)
+        found = replace(system, warnings=(*system.warnings, warning))
+    return replace(found, origin=partial(prepared, system, plan))
 
 
 def solve(
@@ -242,7 +241,7 @@ def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellE
     """
     if done.statistics:
         pairs = zip(done.statistics, second.statistics, cells, strict=True)
-        errors = [_of_statistics(ours, theirs) + found.largest for ours, theirs, found in pairs]
+        errors = [_of_statistics(ours, theirs.__getitem__) + found.largest for ours, theirs, found in pairs]
         why = UNBROKEN if all(found.converged for found in cells) else CELLS_UNKNOWN
     else:
         runs = zip(done.runs, second.runs, cells, strict=True)
@@ -280,7 +279,7 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
             reference = match(name, {}, SceneView(case.scene, run))
             if i in (begun[0], begun[-1]):
                 exact_values(reference, case.scene, run)
-            errors[i] = _of_statistics(done.statistics[i], reference)
+            errors[i] = _of_statistics(done.statistics[i], partial(getattr, reference))
             why = UNBROKEN if np.isnan(errors[i]) else why
             for which, values in exact.items():
                 values[i] = getattr(reference, which)
@@ -290,9 +289,9 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
     return SweepAccuracy(errors, f"exact solution {name}", exact, why if np.isnan(errors).any() else "")
 
 
-def _of_statistics(found: Rupture, exact: references.Reference | Rupture) -> float:
+def _of_statistics(found: Mapping[str, float], exact: Callable[[str], float]) -> float:
     """Return the largest error of the load at rupture, or that of the lifetime; absolute if the exact value is zero."""
-    pairs = [(getattr(found, each.name), getattr(exact, each.name)) for each in fields(found)]
+    pairs = [(ours, exact(which)) for which, ours in found.items()]
     known = [pair for pair in pairs if not np.isnan(pair[0])]  # what a run has not reached has no error
     errors = [float(abs(ours - true) / abs(true) if true else abs(ours)) for ours, true in known]
     return float(np.max([EPS, *errors])) if errors else np.nan
@@ -398,18 +397,16 @@ class SweepSolution(Results):
         return float(np.max([getattr(balances, f"{balance}_error") for balances in self.audits]))
 
     @cached_property
-    def statistics(self) -> Sequence[Rupture]:
+    def statistics(self) -> Sequence[dict[str, float]]:
         """Mode, median and mean of the load at rupture of each run, or its lifetime; empty if the sweep has none."""
         if self.plan.until is None or not spectrum.breaks_bonds(self.system):
             return []
-        if not self.plan.load:
-            return [spectrum.lifetime(run) for run in self.runs]
         return [spectrum.statistics(run, self.plan.load) for run in self.runs]
 
     @cached_property
     def statistic_names(self) -> list[str]:
         """Names of the statistics."""
-        return [each.name for each in fields(self.statistics[0])] if self.statistics else []
+        return [*self.statistics[0]] if self.statistics else []
 
     @property
     def ends(self) -> str:
@@ -461,7 +458,7 @@ class SweepSolution(Results):
             if self.plan.load:
                 q = quantities(self.system)[self.plan.load]
                 name, unit, text = f"{q.name}_{which}", q.unit, f"{STATISTICS[which]} {q.long_name} at rupture"
-            found = [getattr(statistics, which) for statistics in self.statistics]
+            found = [statistics[which] for statistics in self.statistics]
             columns.append(self._of_each(name, found, unit, text))
             if self.accuracy and which in self.accuracy.exact:
                 exact = self.accuracy.exact[which]

@@ -93,7 +93,7 @@ def test_what_has_no_lifetime_says_so(tmp_path):
 
 def test_a_run_that_ends_too_early_determines_no_force_of_rupture():
     found = surfacechem.sweep("force-spectroscopy", {RATE: ["100 pN/s"]}, {"f": "3 pN"})
-    assert np.isnan(found.statistics[0].mode)
+    assert np.isnan(found.statistics[0]["mode"])
     assert found.accuracy.unknown == "unknown in 1 run: the run ended with too many bonds left"
 
 
