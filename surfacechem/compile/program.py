@@ -11,7 +11,7 @@ import pickle
 import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -521,50 +521,132 @@ def _entries(
     return expanded(names, [slopes[i].get(variables[j], zero) for i, j in wanted])
 
 
-def _slopes(
-    inputs: Sequence[Any], residual: Sequence[Any], variables: Sequence[Any], named: Named
-) -> tuple[Function, NDArray[np.int64]]:
-    """Return the code of the Jacobian, and the positions of the computed derivatives if these are not all."""
-    named = needed(named, residual)
-    wanted, places = tuple(_derivatives(len(residual), ())), np.empty(0, np.int64)
-    if len(wanted) >= SPARSE_FROM:
-        wanted, places = _nonzeros(residual, variables, (), named)
-    parts = _Derivatives(tuple(residual), tuple(variables), tuple(named), wanted)
-    return _machine_code(tuple(inputs), parts, steps=True), places
+@dataclass(frozen=True)
+class Equations:
+    """The expressions of a program, which may contain ``named`` symbols, and the code that is compiled from them."""
 
+    inputs: Sequence[Any]
+    n: int
+    residual: Sequence[Any]
+    ledger: Sequence[Any]
+    margins: Sequence[Any]
+    chains: Sequence[Chain]
+    named: Named
 
-def _nonzeros(
-    residual: Sequence[Any], variables: Sequence[Any], chains: Sequence[Chain], named: Named
-) -> tuple[tuple[tuple[int, int], ...], NDArray[np.int64]]:
-    """Return equation and variable of the derivatives that may be nonzero, and their positions."""
-    depends = _depends(residual, variables, named)
-    every = {k: (i, j) for k, (i, j) in enumerate(_derivatives(len(residual), chains)) if j in depends[i]}
-    return tuple(every.values()), np.array([*every], np.int64)
+    @property
+    def variables(self) -> Sequence[Any]:
+        """The states, then their rates."""
+        return self.inputs[1 : 1 + 2 * self.n]
 
+    @property
+    def core(self) -> int:
+        """Number of states before all chains."""
+        return self.chains[0].first if self.chains else self.n
 
-def _chained(
-    inputs: Sequence[Any], residual: Sequence[Any], variables: Sequence[Any], chains: Sequence[Chain], named: Named
-) -> tuple[Function, Function, NDArray[np.int64]]:
-    """Return the code of equations with chains and of their Jacobian, and the positions of its derivatives.
+    @cached_property
+    def rates(self) -> list[Any] | None:
+        """The rates in explicit form; None if there are chains, or if the equations cannot be solved for the rates."""
+        derivatives = self.variables[self.n :]
+        return None if self.chains else solved_rates(expanded(self.named, self.residual), derivatives)
 
-    Each form of the chains' equations is differentiated once.
-    """
-    from surfacechem.compile.alike import loops_of
+    def parts(self) -> dict[str, Any]:
+        """Return the parts of a program that follow from its expressions."""
+        n, core, inputs = self.n, self.core, self.inputs
+        # Inputs that belong to one cell: its state and rate.
+        own = {*inputs[1 + core : 1 + n], *inputs[1 + n + core : 1 + 2 * n]}
+        whole, ledger, margins = (expanded(self.named, rows) for rows in (self.residual, self.ledger, self.margins))
+        equations, slopes, nonzeros = self._chained(whole, own) if self.chains else self._plain(whole)
+        known = {symbol for row in whole[:core] for symbol in row.free_symbols}
+        read = {symbol for margin in margins for symbol in margin.free_symbols}
+        return {
+            "divisors": self._divisors(ledger),
+            "residual": equations,
+            "jacobian": slopes,
+            "ledger": compile_function(inputs, ledger, own, steps=True) if ledger else None,
+            "margins": compile_function(inputs, margins, own, steps=True) if margins else None,
+            "algebraic": tuple(rate not in known for rate in self.variables[n : n + core]) + (False,) * (n - core),
+            "nonzeros": nonzeros,
+            "margin_inputs": frozenset(j for j, symbol in enumerate(inputs) if symbol in read),
+        }
 
-    core, named, whole = chains[0].first, needed(named, residual), expanded(named, residual)
-    others = [symengine.Integer(0)] * core
-    loops, rest = loops_of(inputs, others + whole[core:], cell_inputs(inputs, core, len(residual)))
-    wanted, nonzeros = _nonzeros(residual, variables, chains, named)
-    places = {(i, 1 + j): place for place, (i, j) in enumerate(wanted)}
-    known = {symbol: place for place, symbol in enumerate(inputs)}
-    left = _entries([*residual[:core], *rest[core:]], variables, named, wanted)
-    slopes = _looped(inputs, [loop.slopes(known, places) for loop in loops], left)
-    return _looped(inputs, loops, [*whole[:core], *rest[core:]]), slopes, nonzeros
+    def _plain(self, whole: Sequence[Any]) -> tuple[Function, Function, NDArray[np.int64]]:
+        """Return the code of equations without chains and of their Jacobian, and the positions of the computed
+        derivatives if these are not all.
+        """
+        named = needed(self.named, self.residual)
+        wanted, places = tuple(_derivatives(self.n, ())), np.empty(0, np.int64)
+        if len(wanted) >= SPARSE_FROM:
+            wanted, places = self._nonzeros(named)
+        parts = _Derivatives(tuple(self.residual), tuple(self.variables), tuple(named), wanted)
+        slopes = _machine_code(tuple(self.inputs), parts, steps=True)
+        return compile_function(self.inputs, whole, steps=True), slopes, places
 
+    def _chained(self, whole: list[Any], own: set[Any]) -> tuple[Function, Function, NDArray[np.int64]]:
+        """Return the code of equations with chains and of their Jacobian, and the positions of its derivatives.
 
-def cell_inputs(inputs: Sequence[Any], core: int, n: int) -> set[Any]:
-    """Return the inputs that belong to one cell: its state and rate."""
-    return {*inputs[1 + core : 1 + n], *inputs[1 + n + core : 1 + 2 * n]}
+        Each form of the chains' equations is differentiated once.
+        """
+        from surfacechem.compile.alike import loops_of
+
+        core, inputs, named = self.core, self.inputs, needed(self.named, self.residual)
+        others = [symengine.Integer(0)] * core
+        loops, rest = loops_of(inputs, others + whole[core:], own)
+        wanted, nonzeros = self._nonzeros(named)
+        places = {(i, 1 + j): place for place, (i, j) in enumerate(wanted)}
+        known = {symbol: place for place, symbol in enumerate(inputs)}
+        left = _entries([*self.residual[:core], *rest[core:]], self.variables, named, wanted)
+        slopes = _looped(inputs, [loop.slopes(known, places) for loop in loops], left)
+        return _looped(inputs, loops, [*whole[:core], *rest[core:]]), slopes, nonzeros
+
+    def _nonzeros(self, named: Named) -> tuple[tuple[tuple[int, int], ...], NDArray[np.int64]]:
+        """Return equation and variable of the derivatives that may be nonzero, and their positions."""
+        depends = _depends(self.residual, self.variables, named)
+        every = {k: (i, j) for k, (i, j) in enumerate(_derivatives(self.n, self.chains)) if j in depends[i]}
+        return tuple(every.values()), np.array([*every], np.int64)
+
+    def _divisors(self, ledger: Sequence[Any]) -> tuple[bool, ...]:
+        """Return the flags of :attr:`Program.divisors`; none where no explicit steps are taken: in large networks, and
+        if the equations do not give their rates.
+        """
+        from surfacechem.compile.vectors import divisors
+
+        if not (rates := self.rates if self.n <= MOST_RATE_STATES else None):
+            return ()
+        accounts = expanded(list(zip(self.variables[self.n :], rates, strict=True)), ledger)
+        return divisors([*rates, *accounts], self.inputs[0], self.variables[: self.n])
+
+    @PREPARATION
+    def rate_code(self) -> Function | None:
+        """Return the code of the rates; None if the equations do not give them."""
+        return compile_function(self.inputs, self.rates, steps=True) if self.rates else None
+
+    def lane_code(self, implicit: bool) -> Lanes | None:
+        """Return the code for eight cases at once; None if the equations do not give their rates, or are too many for
+        implicit steps.
+        """
+        from surfacechem.compile.vectors import compile_lanes, constants_apart
+
+        inputs, rates, n = self.inputs, self.rates, self.n
+        if not rates or (implicit and n > MOST_LANE_STATES):
+            return None
+        known = list(zip(self.variables[n:], rates, strict=True))
+        ledger, margins = (expanded(known, expanded(self.named, rows)) for rows in (self.ledger, self.margins))
+        slopes = []
+        if implicit:  # derivatives of rates by states, row-major, and last by time
+            rows, zero = jacobian(rates, inputs[: 1 + n])[0], symengine.Integer(0)
+            slopes = [row.get(x, zero) for some in (inputs[1 : 1 + n], inputs[:1]) for row in rows for x in some]
+        constants, formed = constants_apart([*rates, *ledger, *margins, *slopes], inputs[1 + 2 * n :])
+        columns, end, given = n + len(ledger), len(formed) - len(slopes), [*inputs, *constants]
+        parts = {"rates": formed[:columns], "margins": formed[columns:end]}
+        parts |= {"states": formed[:n], "slopes": formed[end:]} if implicit else {}
+        try:
+            return Lanes(
+                constants=compile_lanes(inputs, list(constants.values())),
+                nonzeros=frozenset(place for place, slope in enumerate(slopes) if slope != 0),
+                **{name: compile_lanes(given, part) for name, part in parts.items()},
+            )
+        except NotImplementedError:  # a function without vector code
+            return None
 
 
 def compile_program(
@@ -588,7 +670,7 @@ def compile_program(
         counts = f"{len(states)} states, {len(derivatives)} derivatives and {len(residual)} equations"
         raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
-    parts = inputs, len(states), residual, ledger, margins, chains, named
+    equations = Equations(inputs, len(states), residual, ledger, margins, chains, named)
     every = *inputs, *residual, *ledger, *margins, *(part for pair in named for part in pair)
     # Where each kind of expressions ends in the list of all of them.
     lengths = len(inputs), len(states), len(ledger), len(margins)
@@ -599,109 +681,11 @@ def compile_program(
         n_ledger=len(ledger),
         n_margins=len(margins),
         chains=tuple(chains),
-        solved=partial(_compiled_rates, inputs, residual, derivatives, chains, named),
-        laned=partial(_compiled_lanes, inputs, residual, derivatives, chains, (ledger, margins), named),
+        solved=equations.rate_code,
+        laned=equations.lane_code,
         key=key,
-        **kept(partial(_compiled_parts, *parts), key),
+        **kept(equations.parts, key),
     )
-
-
-def _compiled_parts(
-    inputs: Sequence[Any],
-    n: int,
-    residual: Sequence[Any],
-    ledger: Sequence[Any],
-    margins: Sequence[Any],
-    chains: Sequence[Chain],
-    named: Named,
-) -> dict[str, Any]:
-    """Return the parts of a program that follow from its expressions."""
-    variables, core = inputs[1 : 1 + 2 * n], chains[0].first if chains else n
-    own, derivatives = cell_inputs(inputs, core, n), variables[n:]
-    if chains:
-        equations, slopes, nonzeros = _chained(inputs, residual, variables, chains, named)
-    else:
-        slopes, nonzeros = _slopes(inputs, residual, variables, named)
-        equations = compile_function(inputs, expanded(named, residual), steps=True)
-    residual, ledger, margins = (expanded(named, rows) for rows in (residual[:core], ledger, margins))
-    known = {symbol for row in residual for symbol in row.free_symbols}
-    read = {symbol for margin in margins for symbol in margin.free_symbols}
-    return {
-        "divisors": _divisors(inputs, residual, derivatives, ledger),
-        "residual": equations,
-        "jacobian": slopes,
-        "ledger": compile_function(inputs, ledger, own, steps=True) if ledger else None,
-        "margins": compile_function(inputs, margins, own, steps=True) if margins else None,
-        "algebraic": tuple(rate not in known for rate in derivatives[:core]) + (False,) * (n - core),
-        "nonzeros": nonzeros,
-        "margin_inputs": frozenset(j for j, symbol in enumerate(inputs) if symbol in read),
-    }
-
-
-def _divisors(
-    inputs: Sequence[Any], residual: Sequence[Any], derivatives: Sequence[Any], ledger: Sequence[Any]
-) -> tuple[bool, ...]:
-    """Return the flags of :attr:`Program.divisors`; none where no explicit steps are taken: with chains, whose
-    equations are not given, in large networks, and if the equations cannot be solved for the rates.
-    """
-    from surfacechem.compile.vectors import divisors
-
-    few = len(residual) == len(derivatives) <= MOST_RATE_STATES
-    if not (rates := solved_rates(residual, derivatives) if few else None):
-        return ()
-    accounts = expanded(list(zip(derivatives, rates, strict=True)), ledger)
-    return divisors([*rates, *accounts], inputs[0], inputs[1 : 1 + len(rates)])
-
-
-@PREPARATION
-def _compiled_rates(
-    inputs: Sequence[Any], residual: Sequence[Any], derivatives: Sequence[Any], chains: Sequence[Chain], named: Named
-) -> Function | None:
-    """Return the code of the rates; None if there are chains."""
-    rates = None if chains else solved_rates(expanded(named, residual), derivatives)
-    return compile_function(inputs, rates, steps=True) if rates else None
-
-
-def _compiled_lanes(
-    inputs: Sequence[Any],
-    residual: Sequence[Any],
-    derivatives: Sequence[Any],
-    chains: Sequence[Chain],
-    others: Sequence[Sequence[Any]],
-    named: Named,
-    implicit: bool,
-) -> Lanes | None:
-    """Return the code for eight cases at once; None if the equations do not give their rates explicitly, or are too
-    many for implicit steps.
-    """
-    from surfacechem.compile.vectors import compile_lanes, constants_apart
-
-    many = implicit and len(derivatives) > MOST_LANE_STATES
-    rates = None if chains or many else solved_rates(expanded(named, residual), derivatives)
-    if not rates:
-        return None
-    known = list(zip(derivatives, rates, strict=True))
-    others = [expanded(named, rows) for rows in others]
-    ledger, margins = (expanded(known, rows) for rows in others)
-    slopes = _lane_slopes(rates, inputs) if implicit else []
-    constants, formed = constants_apart([*rates, *ledger, *margins, *slopes], inputs[1 + 2 * len(rates) :])
-    columns, end, given = len(rates) + len(ledger), len(formed) - len(slopes), [*inputs, *constants]
-    parts = {"rates": formed[:columns], "margins": formed[columns:end]}
-    parts |= {"states": formed[: len(rates)], "slopes": formed[end:]} if implicit else {}
-    try:
-        return Lanes(
-            constants=compile_lanes(inputs, list(constants.values())),
-            nonzeros=frozenset(place for place, slope in enumerate(slopes) if slope != 0),
-            **{name: compile_lanes(given, part) for name, part in parts.items()},
-        )
-    except NotImplementedError:  # a function without vector code
-        return None
-
-
-def _lane_slopes(rates: Sequence[Any], inputs: Sequence[Any]) -> list[Any]:
-    """Return the derivatives of rates by states, row-major, and last by time."""
-    rows, zero = jacobian(rates, inputs[: 1 + len(rates)])[0], symengine.Integer(0)
-    return [row.get(x, zero) for some in (inputs[1 : 1 + len(rates)], inputs[:1]) for row in rows for x in some]
 
 
 def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | None:

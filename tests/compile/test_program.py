@@ -82,7 +82,7 @@ def test_a_scene_that_was_compiled_before_is_read_and_gives_the_same_bits(case, 
 
     first = run()
     with monkeypatch.context() as patch:
-        patch.setattr(program, "_compiled_parts", lambda *_: pytest.fail("compiled again"))
+        patch.setattr(program.Equations, "parts", lambda *_: pytest.fail("compiled again"))
         patch.setattr(Model, "_compiled_outputs", lambda *_: pytest.fail("compiled again"))
         assert run() == first
     for file in (tmp_path / "code").iterdir():
