@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -49,89 +48,55 @@ FEISTEL_ROUNDS = 6
 """Rounds of a permutation: four make it indistinguishable from a random one, two more cost little."""
 
 
-class Distribution(ABC):
-    """Probability distribution of the value of a parameter."""
-
-    source: str = ""
-    """Name of a random number shared by all parameters with this source; empty if each has its own."""
-
-    @abstractmethod
-    def at(self, u: Array) -> Array:
-        """Return quantiles: the values below which the fractions ``u`` of all draws lie."""
-
-    @property
-    def over_decades(self) -> bool:
-        """True if the distribution is one of ratios of values."""
-        return False
-
-    @property
-    def record(self) -> dict[str, Any]:
-        """Entries from which the distribution can be restored."""
-        return {"kind": type(self).__name__, **asdict(self)}  # type: ignore[call-overload]
+def _uniform(u: Array, low: float, high: float, logarithmic: bool = False) -> Array:
+    if not logarithmic:
+        return low + (high - low) * u
+    return np.asarray(np.exp(np.log(low) + np.log(high / low) * u))
 
 
-@dataclass(frozen=True)
-class Uniform(Distribution):
-    """Uniform distribution between two values, or of the logarithm between theirs."""
-
-    low: float
-    high: float
-    logarithmic: bool = False
-
-    @property
-    def over_decades(self) -> bool:
-        return self.logarithmic
-
-    def at(self, u: Array) -> Array:
-        if not self.logarithmic:
-            return self.low + (self.high - self.low) * u
-        return np.asarray(np.exp(np.log(self.low) + np.log(self.high / self.low) * u))
-
-
-@dataclass(frozen=True)
-class Normal(Distribution):
-    """Normal distribution, by its mean and standard deviation."""
-
-    mean: float
-    std: float
-
-    def at(self, u: Array) -> Array:
-        return self.mean + self.std * _standard_normal(u)
-
-
-@dataclass(frozen=True)
-class Lognormal(Distribution):
-    """Lognormal distribution, by its median and the standard deviation of the logarithm."""
-
-    median: float
-    sigma: float
-
-    @property
-    def over_decades(self) -> bool:
-        return True
-
-    def at(self, u: Array) -> Array:
-        return np.asarray(self.median * np.exp(self.sigma * _standard_normal(u)))
-
-
-@dataclass(frozen=True)
-class Drawn(Distribution):
-    """Uniform distribution over the rows of a table; columns of one table are drawn by the same row."""
-
-    values: tuple[float, ...]
-    source: str = ""
-
-    def at(self, u: Array) -> Array:
-        return np.array(self.values)[np.minimum((u * len(self.values)).astype(np.int64), len(self.values) - 1)]
-
-
-TYPES: Mapping[str, Callable[..., Distribution]] = {kind.__name__: kind for kind in (Uniform, Normal, Lognormal, Drawn)}
+QUANTILES: Mapping[str, Callable[..., Any]] = {
+    "Uniform": _uniform,
+    "Normal": lambda u, mean, std: mean + std * _standard_normal(u),
+    "Lognormal": lambda u, median, sigma: median * np.exp(sigma * _standard_normal(u)),
+    "Drawn": lambda u, values, source: np.take(values, np.minimum((u * len(values)).astype(np.int64), len(values) - 1)),
+}
+"""Values below which the fractions ``u`` of all draws lie, by kind of distribution: uniform between two values or, if
+``logarithmic``, between their logarithms; normal; lognormal, by the standard deviation of the logarithm; over the rows
+of a table.
+"""
 
 
 def _standard_normal(u: Array) -> Array:
     from scipy.special import ndtri
 
     return np.asarray(ndtri(u))
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """Probability distribution of the value of a parameter: its kind, with the numbers that belong to it."""
+
+    kind: str
+    numbers: Mapping[str, Any]
+
+    @property
+    def source(self) -> str:
+        """Name of a random number shared by all parameters with this source; empty if each has its own."""
+        return str(self.numbers.get("source", ""))
+
+    @property
+    def over_decades(self) -> bool:
+        """True if the distribution is one of ratios of values."""
+        return self.kind == "Lognormal" or bool(self.numbers.get("logarithmic"))
+
+    def at(self, u: Array) -> Array:
+        """Return quantiles."""
+        return np.asarray(QUANTILES[self.kind](u, **self.numbers))
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Entries from which the distribution can be restored."""
+        return {"kind": self.kind, **self.numbers}
 
 
 @dataclass(frozen=True)
@@ -166,8 +131,8 @@ def recorded_sample(content: Mapping[str, Any]) -> Sample:
     """Restore a sample from its record; LookupError, TypeError or ValueError if that is invalid."""
     draws = {}
     for path, record in content["draws"].items():
-        given = {name: tuple(value) if isinstance(value, list) else value for name, value in record.items()}
-        draws[str(path)] = TYPES[str(given.pop("kind"))](**given)
+        draws[str(path)] = Distribution(str(record["kind"]), {name: record[name] for name in record if name != "kind"})
+        draws[str(path)].at(np.array([0.5]))  # an unknown kind, or other numbers than its own
     runs, seed = int(content["runs"]), int(content["seed"])
     return Sample(draws, runs, [*SAMPLERS][[*SAMPLERS].index(content["method"])], seed)
 
@@ -589,24 +554,23 @@ def _logarithmic(values: RangeSection | UniformSection) -> bool:
 
 def _distribution(path: str, tree: Tree, unit: str) -> Distribution:
     section = read(DistributionSection, tree, Context(x=unit))
-    given = [kind for kind in (section.uniform, section.normal, section.lognormal, section.table) if kind is not None]
+    given = {name: kind for name, kind in section.values.items() if kind is not None}
     if len(given) != 1:
         raise tree.error(
             "a distribution is one of uniform, normal, lognormal and table, `normal: {mean: ..., std: ...}`."
         )
-    kind: Any = given[0]
+    ((name, kind),) = given.items()
     if isinstance(kind, TableSection):
         return _column(kind, path, unit)
-    if section.normal is not None:
-        return Normal(kind.mean, kind.std)
-    if section.lognormal is not None:
-        return Lognormal(kind.median, kind.sigma)
+    if not isinstance(kind, UniformSection):
+        return Distribution(name.capitalize(), kind.values)
     if not kind.first < kind.last:
         raise kind.error(f"the values from {kind.first:g} to {kind.last:g} do not increase.")
-    return Uniform(kind.first, kind.last, _logarithmic(kind))
+    numbers = {"low": kind.first, "high": kind.last, "logarithmic": _logarithmic(kind)}
+    return Distribution("Uniform", numbers)
 
 
-def _column(table: TableSection, path: str, unit: str) -> Drawn:
+def _column(table: TableSection, path: str, unit: str) -> Distribution:
     """Return a column of a table; all columns of the same text are drawn by the same row."""
     if not table.csv:
         raise table.error("the table needs a `file`.")
@@ -615,4 +579,4 @@ def _column(table: TableSection, path: str, unit: str) -> Drawn:
     values = content.column(table.column or variable, unit, variable)
     if not values:
         raise table.error("the table has no rows.")
-    return Drawn(tuple(values), source=sha256(table.csv.encode()).hexdigest()[:12])
+    return Distribution("Drawn", {"values": values, "source": sha256(table.csv.encode()).hexdigest()[:12]})

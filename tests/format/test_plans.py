@@ -13,24 +13,22 @@ from surfacechem.errors import InputError
 from surfacechem.format.plans import (
     SAMPLERS,
     Axis,
+    Distribution,
     EvenlySpaced,
-    Lognormal,
-    Normal,
     Plan,
     Sample,
-    Uniform,
     permuted,
     recorded_plan,
 )
 
 K_0, C_R = "interface.potential.bond-energy.K_0", "interface.bonding.linear-affinity.c_r"
-GIVEN = {"a": Uniform(1.0, 3.0), "b": Normal(-1.0, 2.0), "c": Lognormal(2.0, 0.5), "d": Uniform(1e-3, 10.0, True)}
 LAWS = {
-    "a": stats.uniform(1, 2),
-    "b": stats.norm(-1, 2),
-    "c": stats.lognorm(0.5, scale=2),
-    "d": stats.loguniform(1e-3, 10),
+    "a": (Distribution("Uniform", {"low": 1.0, "high": 3.0}), stats.uniform(1, 2)),
+    "b": (Distribution("Normal", {"mean": -1.0, "std": 2.0}), stats.norm(-1, 2)),
+    "c": (Distribution("Lognormal", {"median": 2.0, "sigma": 0.5}), stats.lognorm(0.5, scale=2)),
+    "d": (Distribution("Uniform", {"low": 1e-3, "high": 10.0, "logarithmic": True}), stats.loguniform(1e-3, 10)),
 }
+GIVEN = {name: given for name, (given, _) in LAWS.items()}
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +61,7 @@ def test_draws_follow_their_distributions_and_depend_on_seed_and_number_only(met
     for name, values in sample.at(picked).items():
         assert np.array_equal(values, whole[name][picked])
     if runs == 4096:
-        for name, law in LAWS.items():
+        for name, (_, law) in LAWS.items():
             assert stats.kstest(whole[name], law.cdf).pvalue > 1e-3
         assert abs(np.corrcoef([*whole.values()])[0, 1]) < 0.1
     other = Sample(GIVEN, runs, method, seed=6).at(np.arange(runs))
@@ -71,12 +69,13 @@ def test_draws_follow_their_distributions_and_depend_on_seed_and_number_only(met
 
 
 def test_a_latin_hypercube_has_one_draw_in_each_part():
-    sample = Sample({"a": Uniform(0.0, 1000.0), "b": Uniform(0.0, 1000.0)}, 1000, "latin-hypercube", 3)
+    even = Distribution("Uniform", {"low": 0.0, "high": 1000.0})
+    sample = Sample({"a": even, "b": even}, 1000, "latin-hypercube", 3)
     drawn = sample.at(np.arange(1000))
     for values in drawn.values():
         assert sorted(values.astype(int)) == list(range(1000))
-    far = Sample({"a": Uniform(0.0, 1.0)}, 10**9, "latin-hypercube").at(np.array([0, 10**9 - 1]))["a"]
-    assert np.all((far > 0) & (far < 1))
+    far = Sample({"a": even}, 10**9, "latin-hypercube").at(np.array([0, 10**9 - 1]))["a"]
+    assert np.all((far > 0) & (far < 1000))
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 64, 1000])
