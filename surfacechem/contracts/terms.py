@@ -525,11 +525,6 @@ class HeatTransfer(Law):
     """Resistances of the first wall, the film and the second wall [m^2 K/W]; None if heat is not produced across a
     film."""
 
-    @property
-    def is_film(self) -> bool:
-        """True if heat produced in the medium leaves it across the resistance of the medium."""
-        return self.closure == "medium" and self.resistances is not None
-
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
         """Return the parallel conductances whose sum is the total, by channel of heat transfer."""
         return {self.channel: self.statement}

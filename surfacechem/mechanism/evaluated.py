@@ -12,6 +12,7 @@ import math
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -278,12 +279,6 @@ class NeighbourReaction(EvaluatedReaction):
         return Formula((), lambda _: self.enthalpy), Formula((), lambda _: self.gibbs)
 
 
-def _amounts_taken(surface: Any, phases: Sequence[Any]) -> Any:
-    """Return the amount of each species of these phases that each reaction takes, shape (species, reactions)."""
-    rows = [index for phase in phases for index in indices(surface, phase)]
-    return np.asarray(surface.reactant_stoich_coeffs - surface.product_stoich_coeffs)[rows]
-
-
 class SurfaceEngine:
     """A Cantera surface that evaluates the net rates of some of its reactions, and what they take from neighbours.
 
@@ -311,7 +306,10 @@ class SurfaceEngine:
         first, own = species[0], [item.variable for item in species]
         self._own = "T_c", first.concentration, *own
         self._sites, self._count = first.sites, len(own)
-        self._taken = _amounts_taken(surface, [held.phase for held in self.held])[:, open_ones] / MOLECULAR
+        taken = np.asarray(surface.reactant_stoich_coeffs - surface.product_stoich_coeffs)
+        rows = [*chain.from_iterable(indices(surface, held.phase) for held in self.held)]
+        self._taken = taken[rows][:, open_ones] / MOLECULAR
+        """What each reaction takes from neighbours, shape (species, reactions)."""
         self._energies = np.empty(0)
         self._lay_out()
         self._brought: list[tuple[object, ...]] = [()]

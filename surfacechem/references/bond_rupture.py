@@ -334,11 +334,9 @@ class RebindingCluster(Cluster):
             return AutonomousODE(rupture, self.phi_i, [x for x in [self.phi_i - self.critical_state] if x > 0.0])
         end, steady = self._about(self._above_critical), self.steady_state
         side = math.copysign(1.0, self.phi_i - steady)
-
-        def relaxing(_: Array, left: Array) -> Array:
-            return side * scale * end.rate(side * left, steady + side * left)
-
-        return AutonomousODE(relaxing, abs(self.phi_i - steady))
+        return AutonomousODE(
+            lambda _, left: side * scale * end.rate(side * left, steady + side * left), abs(self.phi_i - steady)
+        )
 
     def quantities(self, t: Array) -> Quantities:
         if not self.breaks and self.phi_i == self.steady_state:

@@ -27,7 +27,8 @@ from surfacechem.tolerances import NO_AMOUNT
 
 def laws(build: Build) -> Iterator[Record]:
     """Yield the fluxes between nodes and the external heat."""
-    films = [law for law in build.scene.heat if law.is_film]
+    # Heat produced in a medium leaves it across the medium's own resistance.
+    films = [law for law in build.scene.heat if law.closure == "medium" and law.resistances is not None]
     # Parallel paths between the same ends are added up, by channel.
     groups: dict[frozenset[str], tuple[tuple[str, str], dict[str, Expression]]] = {}
     for law in (law for law in build.scene.heat if law not in films):
