@@ -120,14 +120,15 @@ def equations(system: System) -> tuple[list[Equation], dict[str, str]]:
     """
     printer = PaperPrinter(_names(system))
     symbols = {p.path: printer.text(p.symbol) for p in system.parameters}
-    symbols |= {s.path: printer.text(symengine.Symbol(s.at_start[0].name)) for s in reversed(system.states)}
+    symbols |= {s.path: rf"{printer.text(symengine.Symbol(s.at_start[0].name))}(0)" for s in reversed(system.states)}
     return [printer.equation(line) for line in statements(system)], symbols
 
 
-def latex(system: System, title: str = "") -> str:
-    """Return the equations as a LaTeX align environment, with the values of the parameters as comments."""
+def latex(system: System, title: str) -> str:
+    """Return the equations as a LaTeX align environment, with the values of the case as comments."""
     lines, symbols = equations(system)
-    values = [f"%   {symbols[p.path]} = {float(p.at(0.0))!r} {parameter_text(p)}" for p in system.parameters]
+    given, values = (p for p in system.parameters if p.path in system.changeable), [f"% {safe(title)}: {system.regime}"]
+    values += [f"%   {symbols[p.path]} = {float(p.at(0.0))!r} {parameter_text(p)}" for p in given]
     names = [symbols[system.parameters[j].path] for j in changing(system)]
     for start, numbers in pieces(system)[1:]:
         then = ", ".join(f"{name} = {number!r}" for name, number in zip(names, numbers, strict=True))
@@ -137,8 +138,7 @@ def latex(system: System, title: str = "") -> str:
         equation = " ".join((line.left, *line.pieces)).replace("= ", "&= ", 1)
         note = "; ".join(filter(None, (line.text, line.when))).translate(LATEX_ESCAPES).replace("^", r"\^{}")
         rows.append(rf"  {equation} && \text{{{note}}}")
-    heading = safe(f"{title}: {system.regime}" if title else system.regime)
-    return "\n".join([f"% {heading}", *values, r"\begin{align*}", " \\\\\n".join(rows), r"\end{align*}", ""])
+    return "\n".join([*values, r"\begin{align*}", " \\\\\n".join(rows), r"\end{align*}", ""])
 
 
 def statements(system: System) -> list[Statement]:

@@ -135,7 +135,7 @@ def test_every_piece_of_a_history_is_printed(name):
         assert [at[j] for j in module.CHANGING] == [row[j] for j in module.CHANGING]
         y, ydot = problem.y0.tolist(), [0.0] * len(problem.y0)
         assert module.residual(t, y, ydot) == module.residual(t, y, ydot, at)
-    text = latex(model.system)
+    text = latex(model.system, name)
     assert all(f"from {start!r} s on" in text for start, _ in module.PIECES[1:])
 
 

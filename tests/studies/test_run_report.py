@@ -125,7 +125,7 @@ def test_numbers_are_those_of_the_run_and_say_where_they_are_not_those_of_the_ca
 def test_a_temperature_at_the_start_that_cells_share_has_the_name_of_the_surface():
     case = surfacechem.load("epoxy-cure-thick").case
     symbols = equations(replace(case, scene=spatial.few(case.scene)).system())[1]
-    assert [symbols[path] for path in ("initial.T", "initial.T_2")] == ["T", "T_2"]
+    assert [symbols[path] for path in ("initial.T", "initial.T_2")] == ["T(0)", "T_2(0)"]
 
 
 def test_a_temperature_that_was_changed_is_that_of_the_drawing():
