@@ -171,7 +171,7 @@ FOLLOWING |= {"stick-slip": 1000, "stick-slip-debonding": 1000, "stick-slip-rebo
 @pytest.mark.parametrize("name", [name for name in REFERENCED if name not in CELLS])
 def test_the_error_of_a_case_follows_its_tolerance_in_few_steps(name):
     simulation = load(name)
-    for rtol in 10.0 ** -np.arange(3.0, 14.0, 2.0):
+    for rtol in (1e-3, 1e-6, 1e-9, 1e-13):
         solution = simulation.run(run=replace(simulation.case.run, rtol=rtol, accuracy=None))
         assert solution.status == ("stopped" if name in STOPPED else "finished")
         assert solution.accuracy.error < FOLLOWING.get(name, 100) * rtol

@@ -184,7 +184,7 @@ SPRINGS = "{bond-stiffness: {E_b: 1e13 Pa/m, E_n: 1e14 Pa/m}}, {lattice-gas: {ep
 def run(folder, potential, load="", more=""):
     path = folder / "case.yaml"
     path.write_text(HEATED.format(potential=potential, load=load, more=more))
-    return surfacechem.load(path).run()
+    return surfacechem.load(path).run(error="balances")
 
 
 @pytest.mark.parametrize(
@@ -213,7 +213,7 @@ def test_bonds_that_form_and_break_are_of_both_classes(tmp_path):
     body = "{temperature: T_1, C: 1 J/m^2/K}"
     path.write_text("\n".join(lines).replace("a: {temperature: 300 K}", f"a: {body}").replace("20 s", "2 s")
                     + f"\n{history}\ninitial: {{T_1: 300 K}}\n")  # fmt: skip
-    solution = surfacechem.load(path).run()
+    solution = surfacechem.load(path).run(error="balances")
     assert solution.attributes["reaction"] == "exothermic and endothermic"
     assert float(solution.dataset["e_c"][0]) == pytest.approx(0.5e-3 * 0.8**2 / 1e16, rel=1e-12)
 

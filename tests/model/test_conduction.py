@@ -14,8 +14,10 @@ import surfacechem
 from surfacechem import plots
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
+from surfacechem.references.base import SceneView
 from surfacechem.results import spatial
 from surfacechem.results.error_estimates import against_tighter, with_cells
+from surfacechem.results.matching import match
 from surfacechem.results.spatial import cell_errors
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import graded
@@ -164,7 +166,7 @@ def test_a_sweep_takes_the_cells_that_its_runs_need_and_states_what_they_leave()
 
 
 def test_an_accuracy_out_of_reach_is_said(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(spatial, "MOST_CHOSEN_CELLS", 32)
+    monkeypatch.setattr(spatial, "MOST_CHOSEN_CELLS", 16)
     warnings = two("{accuracy: 1e-9}", perfect=True, exact=False).run().warnings
     assert any("the accuracy 1e-09 of the cells is not reached" in warning for warning in warnings)
 
@@ -235,9 +237,13 @@ def test_an_exact_solution_of_another_scene_is_not_used():
     }
     cells = [f"bodies.{name}.conduction.cells=4" for name in ("epoxy", "glass")]
     for reason, change in cases.items():
-        source = surfacechem.run("sudden-contact", [*cells, *change, "run.until=1 s"]).accuracy.source
-        assert reason in source
-        assert "one with cells that suit" in source
+        simulation = surfacechem.load("sudden-contact", [*cells, *change, "run.until=1 s"])
+        run = simulation.run(error="balances").trajectory
+        with pytest.raises(InputError, match=reason):
+            match("conducting-slabs", {}, SceneView(simulation.case.scene, run))
+    source = simulation.run().accuracy.source
+    assert reason in source
+    assert "one with cells that suit" in source
 
 
 # -- temperatures of slabs in closed form: Carslaw & Jaeger (1959), sections 2.7, 2.9, 3.4 and 3.11; lengths in units of

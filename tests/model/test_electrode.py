@@ -52,7 +52,7 @@ def current(edge, volts):
 
 
 def test_without_a_current_it_finds_open_circuit(edge):
-    data = surfacechem.run(case("electric-potential: -3.3 V, capacitance: 20 uF/cm^2")).dataset
+    data = surfacechem.load(case("electric-potential: -3.3 V, capacitance: 20 uF/cm^2")).run(error="balances").dataset
     known = solve_ivp(lambda _, V: [current(edge, V[0]) / 0.2], (0, 1), [-3.3], method="LSODA", rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(data["V_electron"][-1], known.y[0, -1], atol=1e-7)
     open_circuit = brentq(lambda V: current(edge, V), -3.3, -2.5, xtol=1e-12)
@@ -61,7 +61,7 @@ def test_without_a_current_it_finds_open_circuit(edge):
 
 def test_under_a_current_the_reactions_come_to_carry_it(edge):
     text = "electric-potential: -2.9 V, capacitance: 0.2 F/m^2, current: -3 A/m^2"
-    solution = surfacechem.run(case(text, until="5 s"))
+    solution = surfacechem.load(case(text, until="5 s")).run(error="balances")
     data = solution.dataset
     carried = brentq(lambda V: current(edge, V) - 3.0, -3.3, -2.5, xtol=1e-12)
     assert float(data["V_electron"][-1]) == pytest.approx(carried, abs=1e-7)
@@ -70,7 +70,7 @@ def test_under_a_current_the_reactions_come_to_carry_it(edge):
 
 def test_books_of_charge_and_energy():
     text = "electric-potential: -2.9 V, capacitance: 0.2 F/m^2, current: {ramp: {rate: -2 A/m^2/s}}"
-    solution = surfacechem.run(case(text, until="3 s"))
+    solution = surfacechem.load(case(text, until="3 s")).run(error="balances")
     data = solution.dataset
     t, V = data["time"].values, data["V_electron"].values
     np.testing.assert_allclose(0.2 * (V - V[0]), -CHARGE * data["made_electron"] - t**2, atol=1e-6)
@@ -93,10 +93,10 @@ def test_at_rest_under_a_current(edge):
 
 def test_a_capacitance_is_a_parameter():
     simulation = surfacechem.load(case("electric-potential: -3.3 V, capacitance: 0.2 F/m^2", until="1 ms"))
-    slow = simulation.run({"interface.mechanism.neighbours.electron.capacitance": 2000.0})
+    slow = simulation.run({"interface.mechanism.neighbours.electron.capacitance": 2000.0}, error="balances")
     assert slow.trajectory.model is simulation.run().trajectory.model
     assert float(slow.dataset["V_electron"][-1]) == pytest.approx(-3.3, abs=0.01)
-    moved = simulation.run({"initial.V_electron": -2.0})
+    moved = simulation.run({"initial.V_electron": -2.0}, error="balances")
     assert float(moved.dataset["V_electron"][0]) == -2.0
 
 

@@ -56,7 +56,7 @@ def both(a, b, x_f, x_r, k_f=1.0, k_r=1.0):
 
 @pytest.mark.parametrize("force", ["0 pN", "30 pN"])
 def test_vinculin_keeps_detailed_balance_under_any_force(force):
-    solution = surfacechem.load("vinculin-catch-bond", {"loading.f": force}).run()
+    solution = surfacechem.load("vinculin-catch-bond", {"loading.f": force}).run(error="balances")
     data = solution.dataset
     np.testing.assert_allclose(data["departure_R3_R4"], math.log(6.1 / 43) + 16.24 / 8.314462618, atol=1e-10)
     assert solution.audit.violations == ()
@@ -64,7 +64,8 @@ def test_vinculin_keeps_detailed_balance_under_any_force(force):
 
 
 def test_the_force_works_along_the_distances():
-    data = surfacechem.load("vinculin-catch-bond", {"run.outputs": 4001}).run().dataset.isel(time=slice(1, None))
+    data = surfacechem.load("vinculin-catch-bond", {"run.outputs": 4001}).run(error="balances").dataset
+    data = data.isel(time=slice(1, None))
     rate = data["R_R3"] - data["R_R4"]
     f, T = 8e-12, 298.15
     entropy = -16.24 / 6.02214076e23
@@ -79,7 +80,7 @@ def test_around_a_cycle_distances_have_to_close(tmp_path):
     closed = [*both("a", "b", 0.4, -0.6), *both("b", "c", 0.5, -0.5), *both("c", "a", -1.0, 1.0)]
     open_ones = [*closed[:4], *both("c", "a", 0.5, -0.5)]
     for steps, expected in ((closed, 0.0), (open_ones, 1e-9 * 10e-12 / KT)):
-        data = pairs(tmp_path, *steps).run().dataset
+        data = pairs(tmp_path, *steps).run(error="balances").dataset
         for label in ("R1_R2", "R3_R4", "R5_R6"):
             np.testing.assert_allclose(data[f"departure_{label}"], expected, atol=1e-10)
 
@@ -87,7 +88,8 @@ def test_around_a_cycle_distances_have_to_close(tmp_path):
 def test_a_reaction_whose_reverse_knows_no_force_keeps_its_equilibrium(tmp_path):
     """Between a and b one reversible reaction says that no length changes, so a pair that says otherwise departs."""
     reversible = "- {equation: a <=> b, duplicate: true, rate-constant: {A: 2 1/s, b: 0, Ea: 0}}\n"
-    data = pairs(tmp_path, *both("a", "b", 0.4, -0.6), reversible=reversible, duplicate=True).run().dataset
+    case = pairs(tmp_path, *both("a", "b", 0.4, -0.6), reversible=reversible, duplicate=True)
+    data = case.run(error="balances").dataset
     np.testing.assert_allclose(data["departure_R1_R2"], 1e-9 * 10e-12 / KT, atol=1e-10)
 
 
@@ -135,7 +137,7 @@ def test_the_equilibrium_feels_the_work_of_the_force(law, load, tmp_path):
     """d ln(phi / (1 - phi)) / df = l / k_B T, with the force or the share of a traction that each bond bears."""
     found = []
     for level in (0, 10):
-        solution = held(tmp_path, law, load.format(level), "90 s").run()
+        solution = held(tmp_path, law, load.format(level), "90 s").run(error="balances")
         last = solution.dataset.isel(time=-1)
         force = float(last["f"])
         found.append((force, math.log(last["phi"] / (1 - last["phi"]))))
@@ -147,7 +149,7 @@ def test_the_equilibrium_feels_the_work_of_the_force(law, load, tmp_path):
 
 
 def test_bells_rates_depart_from_no_equilibrium_under_a_force(tmp_path):
-    data = held(tmp_path, BELL, "loading: {f: {ramp: {rate: 1 pN/s}}}", "10 s").run().dataset
+    data = held(tmp_path, BELL, "loading: {f: {ramp: {rate: 1 pN/s}}}", "10 s").run(error="balances").dataset
     np.testing.assert_allclose(data["departure_bell"], 0.0, atol=1e-12)
     rate, force = data["R_bell"], data["f"]
     work = np.trapezoid(rate * force * ELL, data["time"])

@@ -56,7 +56,7 @@ def forward(law, pull, m, times, y, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6)
         return [v, (pull(t, u) - friction) / (m * v), np.exp(-ln_theta) * ages]
 
     start = [y[0], np.log(y[1]), y[2]]
-    found = solve_ivp(rates, (times[0], times[-1]), start, "Radau", times, rtol=1e-10, atol=[1e-17, 1e-11, 1e-11])
+    found = solve_ivp(rates, (times[0], times[-1]), start, "LSODA", times, rtol=1e-12, atol=[1e-18, 1e-12, 1e-12])
     assert found.success
     return found.y[0], np.exp(found.y[1]), found.y[2]
 

@@ -41,9 +41,9 @@ PERFECT = {
 }
 
 
-def run(changes=None, **parts):
+def run(**parts):
     case = load_text(CASE.format(**PERFECT | parts), "softening.yaml")
-    solution = Simulation(case).run(changes)
+    solution = Simulation(case).run(error="balances")
     data = solution.dataset
     assert data.attrs["status"] == "finished", data.attrs["reason"]
     assert data.attrs["energy_error"] < 1e-9

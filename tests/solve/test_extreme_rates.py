@@ -31,7 +31,7 @@ def solve(folder, interface, times, T=300, T_0=300, more="", mechanism=None, rto
         (folder / "mech.yaml").write_text(mechanism)
     text = CASE.format(T=T, T_0=T_0, interface=interface, more=more, times=list(map(float, times)), rtol=rtol)
     (folder / "case.yaml").write_text(text)
-    return surfacechem.run(folder / "case.yaml")
+    return surfacechem.load(folder / "case.yaml").run(error="balances")
 
 
 def bonded(solution):
@@ -164,7 +164,7 @@ initial: {T: 300 K, coverages: {s0: 1}}
 run: {times: [0, 1e-3, 10, 100]}
 """
     )
-    solution = surfacechem.run(tmp_path / "case.yaml")
+    solution = surfacechem.load(tmp_path / "case.yaml").run(error="balances")
     assert solution.status == "finished"
     matrix = np.zeros((length + 1, length + 1))
     for i, k in enumerate(A):
@@ -261,7 +261,7 @@ def network(folder, enthalpies, steps, times, loaded):
             text.append(f"equation: {a} {arrow} {b}, rate-constant: {{A: {k!r}, b: 0, Ea: 0}}")
     more = f"loading: {{f: 0 N}}\ninitial: {{coverages: {{{next(iter(enthalpies))}: 1}}}}"
     solution = solve(folder, "mechanism: mech.yaml", times, more=more, mechanism=mechanism(enthalpies, text))
-    with mpmath.workdps(150):
+    with mpmath.workdps(60):
         values, vectors = mpmath.eig(closed(enthalpies, apart))
         parts = mpmath.lu_solve(vectors, mpmath.matrix([1] + [0] * (len(enthalpies) - 1)))
         modes = [[mpmath.exp(value * t) * part for value, part in zip(values, parts, strict=True)] for t in times]

@@ -161,14 +161,20 @@ def test_libraries_and_sweeps_heat_the_same():
     np.testing.assert_allclose(1000 * rise + 700 * other, 1000 * rise[0], rtol=1e-12)
 
 
-@pytest.mark.parametrize("thermal", ["stores", "spots"])
-def test_a_network_heats_the_same(thermal):
-    case = load_text(pressure_falls(thermal, "rigid", 0))
-    solution = solved(pressure_falls(thermal, "rigid", 0))
-    interface = InterfaceReactor(case)
+@pytest.mark.parametrize(("thermal", "levels"), [("stores", [2, 2, 0.2, 0.2]), ("spots", [0.2, 0.2, 2, 2])])
+def test_a_network_jumps_and_heats_the_same(thermal, levels):
+    """What sticks slips where the pressure falls, and what slides sticks where it rises."""
+    loading = f"{table('p', levels, 'MPa', 0)}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}"
+    case = text(thermal, loading, *SLIDER["rigid"])
+    solution, interface = solved(case), InterfaceReactor(load_text(case))
     net = ReactorNet([interface])
     net.rtol, net.atol = 1e-10, 1e-16
     net.advance(4.0)
+    ours, theirs = interface.scene.events.instant.jumps, solution.trajectory.jumps
+    assert [jump.edge.name for jump in ours] == [jump.edge.name for jump in theirs]
+    assert [jump.released for jump in ours] == pytest.approx([jump.released for jump in theirs], abs=1e-6)
+    assert interface["u_t"] == pytest.approx(float(solution.dataset["u_t"][-1]), rel=1e-9)
+    assert interface.dataset.attrs["energy_error"] < 1e-6
     for name, T in temperatures(solution).items():
         assert interface[name] == pytest.approx(T, abs=1e-5)
 

@@ -265,8 +265,9 @@ LINEAR_CASES = (
 """Stiff cases, those with events, and how many runs are left to other steps."""
 
 
-@pytest.mark.parametrize("rtol", [1e-4, 1e-6])
-@pytest.mark.parametrize(("name", "others"), every(2, LINEAR_CASES))
+@pytest.mark.parametrize(
+    ("name", "others", "rtol"), every(3, [(*case, rtol) for rtol in (1e-4, 1e-6) for case in LINEAR_CASES])
+)
 def test_linearly_implicit_runs_keep_the_tolerance(name, others, rtol, left, monkeypatch):
     problem, columns = arrays_of(case_runs.load(name), implicit=True, rtol=rtol)
     # What they leave would be solved by these.
@@ -340,8 +341,7 @@ def test_a_quotient_of_a_few_states_is_looked_at_only_where_its_divisor_changes(
     assert ends == pytest.approx([width * 5 * np.pi / 16] * 2, rel=1e-5)
 
 
-@pytest.mark.parametrize("implicit", [False, True])
-@pytest.mark.parametrize("seed", every(10, range(80)))
+@pytest.mark.parametrize(("seed", "implicit"), every(19, [(seed, way) for way in (False, True) for seed in range(80)]))
 def test_what_is_narrow_is_seen(seed, implicit, left):
     scene = narrow_scenes.scene(seed)
     simulation = surfacechem.load(scene.text)

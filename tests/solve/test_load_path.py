@@ -10,7 +10,6 @@ from surfacechem.format import load_text
 from surfacechem.laws.free_energy import Penalty, TangentialStiffness
 from surfacechem.laws.friction import RateAndStateAging
 from surfacechem.laws.loading import Hold, Table
-from surfacechem.reactor import InterfaceReactor, ReactorNet
 from surfacechem.results.audit import audit
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
@@ -164,7 +163,7 @@ def test_a_damper_bears_no_jump_of_the_displacement():
 
 # -- friction
 
-RISES, FALLS = pressure([0, 3, 3, 10], [1, 1, 2, 2]), pressure([0, 5, 5, 10], [2, 2, 1, 1])
+RISES = pressure([0, 3, 3, 10], [1, 1, 2, 2])
 
 
 @pytest.mark.parametrize(
@@ -253,21 +252,6 @@ def test_an_elastic_gap_on_a_given_displacement_slips_where_the_pressure_falls()
         assert at(solution, "g_t", t) == pytest.approx(g, rel=1e-9)
     heat = 4e9 / 2 * (held**2 - 0.0625e-3**2)
     assert sum(jump.released for jump in solution.trajectory.jumps) == pytest.approx(heat, rel=1e-9)
-
-
-@pytest.mark.parametrize("loading", [f"{RISES}, {PULLED}", f"{FALLS}, {PULLED}"])
-def test_loads_jump_in_a_reactor_network(loading):
-    case = load_text(SLIDER.format(loading=loading, potential="", static="", outputs=25, solver=OWN))
-    solution = Simulation(case).run(error="balances")
-    interface = InterfaceReactor(case)
-    net = ReactorNet([interface])
-    net.rtol, net.atol = 1e-10, 1e-16
-    net.advance(6.0)
-    ours, theirs = interface.scene.events.instant.jumps, solution.trajectory.jumps
-    assert [jump.edge.name for jump in ours] == [jump.edge.name for jump in theirs]
-    assert [jump.released for jump in ours] == pytest.approx([jump.released for jump in theirs], abs=1e-6)
-    assert interface["u_t"] == pytest.approx(at(solution, "u_t", 6.0), rel=1e-9)
-    assert interface.dataset.attrs["energy_error"] < 1e-6
 
 
 # -- what creeps, and what is late ------------------------------------------------------------------------------------

@@ -43,14 +43,18 @@ def check_scene(seed, rtol):
 
 
 LOOSE = every(2, [(seed, rtol) for rtol in (1e-2, 1e-3) for seed in (10, 216, 227, 326, 359)])
-MANY = [pytest.param(seed, 0.0, marks=pytest.mark.slow) for seed in range(1000, 1600)]
 
 
-@pytest.mark.parametrize(
-    ("seed", "rtol"), [*((seed, 0.0) for seed in (*range(5), 16, *range(6, 10), 43)), *LOOSE, *MANY]
-)
+@pytest.mark.parametrize(("seed", "rtol"), [*((seed, 0.0) for seed in (*range(5), 16, *range(6, 10), 43)), *LOOSE])
 def test_no_narrow_layer_is_passed_over(seed, rtol):
     check_scene(seed, rtol)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(1000, 1600, 20))
+def test_no_narrow_layer_of_many_scenes_is_passed_over(block):
+    for seed in range(block, block + 20):
+        check_scene(seed, 0.0)
 
 
 PLATES = """
@@ -209,6 +213,6 @@ interface:
 loading: {{g_n: {path}}}
 run: {{until: 1 s, rtol: 1e-8}}
 """
-    run = Simulation(load_text(text)).run().dataset
+    run = Simulation(load_text(text)).run(error="balances").dataset
     strongest = 5 ** (-1 / 6) * 3e-10  # where the slope of the tension is zero
     assert run["g_n"].values[run["t_n"].values.argmax()] == pytest.approx(strongest, rel=1e-7)
