@@ -340,17 +340,16 @@ class _Run:
         self, step: Callable[[int], DenseStep], inside: _Inside, ledgers: Array, relied: NDArray[np.bool_]
     ) -> None:
         """Store the outputs within steps, from the ledger at their ends and its rates inside."""
-        times = inside.times
-        for t in self.problem.times[len(self.outputs) :].tolist():
-            if t > times[-1]:
-                break
+        times, asked = inside.times, self.problem.times[len(self.outputs) :]
+        for t in asked[asked <= times[-1]].tolist():
             k = int(np.searchsorted(times[1:], t))
             start, end = times[k : k + 2].tolist()
-            ledger = ledgers[k + 1]
+            state, ledger = inside.y[-1, k], ledgers[k + 1]
             if t < end:
+                state, _ = self._state(step(k), t)
                 gain = gained_at((t - start) / (end - start), inside.ledger[:, k]) * (end - start)
                 ledger = ledgers[k] + (gain if relied[k] else self._gained(step(k), start, t, gain))
-            row = np.concatenate((self._state(step(k), t)[0], ledger))
+            row = np.concatenate((state, ledger))
             if not np.all(np.isfinite(row)):
                 raise StepError("an output is not finite")
             self.outputs.append(row)
