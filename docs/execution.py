@@ -1,5 +1,6 @@
 """Notebooks run in the process that builds the pages: a kernel for each of them would import everything anew."""
 
+import gc
 import io
 from contextlib import redirect_stdout
 from functools import cache
@@ -57,7 +58,8 @@ def executed(path: str) -> tuple[Any, dict[str, Any]]:
     """A notebook with its outputs, and the names that it has defined."""
     shell = Shell.instance(display_pub_class=Publisher, config=Config(HistoryManager={"enabled": False}))
     shell.display_trap.hook = shell.result
-    shell.reset(new_session=True)
+    shell.reset(new_session=True)  # which collects garbage
+    gc.freeze()  # what is there is not looked through for the next notebook
     shell.enable_matplotlib("inline")
     notebook = jupytext.read(path)
     with matplotlib.rc_context():

@@ -5,6 +5,7 @@ A page asks for a table with a comment: ``<!-- made: variables area-stretch -->`
 
 import csv
 import dataclasses
+import gc
 import inspect
 import math
 import re
@@ -54,6 +55,11 @@ formula; see the [theory](../theory.md). How to [add a law](../adding-a-law.md).
 
 
 # -- hooks ------------------------------------------------------------------------------------------------------------
+
+
+def on_startup(**_: Any) -> None:
+    """Collect garbage seldom: at the usual rate all datasets and pages are looked through again and again."""
+    gc.set_threshold(100_000, 20, 50)
 
 
 def on_config(config: Any) -> Any:
