@@ -3,12 +3,8 @@
 import doctest
 import importlib
 import inspect
-import os
 import re
 import shlex
-import shutil
-import subprocess
-import sys
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -131,25 +127,6 @@ def test_the_gallery_shows_every_case():
     for name in names():
         assert f"](cases.md#{name})" in page
         assert f"](images/gallery-{name}.svg)" in page
-
-
-def test_a_law_is_known_once_its_class_is_in_the_file(tmp_path):
-    """Nothing but the class of the page "Adding a law" is put into the package."""
-    shown = {block.title: block.body for block in blocks(ROOT / "docs" / "adding-a-law.md") if block.title}
-    for folder in ("surfacechem", "cases", "mechanisms"):
-        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("*.pyc.*"))
-    with (tmp_path / "surfacechem/laws/friction.py").open("a") as file:
-        file.write("\n\n" + shown["surfacechem/laws/friction.py"])
-    (tmp_path / "eyring.yaml").write_text(shown["eyring.yaml"])
-    for command, expected in (
-        ("laws eyring", "stress scale"),
-        ("equations eyring.yaml", "t_eyring = "),
-    ):
-        process = [sys.executable, "-m", "surfacechem", *command.split()]
-        environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-        done = subprocess.run(process, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-        assert expected in done.stdout
 
 
 def test_every_law_has_its_place_on_a_page(monkeypatch):

@@ -51,13 +51,13 @@ def surfacechem(*arguments, folder):
     return subprocess.run([*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
 
 
-def imported(code, folder):
-    """Modules after some code, as a process of its own sees them."""
-    guarded = f"try:\n    {code}\nexcept SystemExit as end:\n    assert not end.code, end.code"
-    script = f"import sys\n{guarded}\nprint(*sys.modules)"
+def imported(folder, *steps):
+    """Modules after each of the steps of one process."""
+    guarded = "try:\n    {}\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
+    script = "import sys\n" + "".join(f"{guarded.format(step)}print('modules', *sys.modules)\n" for step in steps)
     done = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return set(done.stdout.splitlines()[-1].split())
+    return [set(line.split()) for line in done.stdout.splitlines() if line.startswith("modules ")]
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -72,20 +72,24 @@ def test_run_as_a_process(first):
     assert first.stderr == "" or first.stderr.startswith("compiling the stepper")
 
 
-def test_run_imports_only_what_it_needs(tmp_path):
-    found = imported("from surfacechem.cli.main import app; app(['run', 'sliding-dry'])", tmp_path)
+def test_commands_import_only_what_they_need(tmp_path):
+    """What one step needs the next one finds, but needs no more than is allowed here."""
+    start, check, run, dataset = imported(
+        tmp_path,
+        "from surfacechem.cli.main import app",
+        "app(['check', 'sliding-dry'])",
+        "app(['run', 'sliding-dry'])",
+        "import surfacechem; surfacechem.run('sliding-dry').dataset",
+    )
+    assert not start & {"numpy", "symengine", "numba", "netCDF4", "pint", "pydantic", "rich", "ruamel.yaml", *HEAVY}
+    assert "numba" not in check
     assert (tmp_path / "sliding-dry.nc").exists()
-    assert {"netCDF4", "symengine"} <= found
-    assert not found & {"numba", "pint", "rich", "scipy.interpolate", "scipy.optimize", "scipy.special", *HEAVY}
-    assert "numba" not in imported("from surfacechem.cli.main import app; app(['check', 'sliding-dry'])", tmp_path)
-    drawn = imported("from surfacechem.cli.main import app; app(['plot', 'sliding-dry.nc'])", tmp_path)
+    assert {"netCDF4", "symengine"} <= run
+    assert not run & {"numba", "pint", "rich", "scipy.interpolate", "scipy.optimize", "scipy.special", *HEAVY}
+    assert not dataset & {"dask.array", "pint"}
+    (drawn,) = imported(tmp_path, "from surfacechem.cli.main import app; app(['plot', 'sliding-dry.nc'])")
+    assert (tmp_path / "sliding-dry.png").exists()
     assert not drawn & {"surfacechem.format", "surfacechem.model", "surfacechem.solve", "symengine"}
-    assert not imported("import surfacechem; surfacechem.run('sliding-dry').dataset", tmp_path) & {"dask.array", "pint"}
-
-
-def test_the_command_line_itself_imports_little(tmp_path):
-    found = imported("import surfacechem.cli.main", tmp_path)
-    assert not found & {"numpy", "symengine", "numba", "netCDF4", "pint", "pydantic", "rich", "ruamel.yaml", *HEAVY}
 
 
 @pytest.mark.parametrize("arguments", every(2, [(["run", "exothermic", "--set", "initial.T=0 K"],), (["run"],)]))

@@ -4,6 +4,7 @@ assembled, or refused where it stands.
 
 import io
 import re
+from functools import cache
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -125,7 +126,17 @@ def misspelt(draw, word):
 TEXTS = {"every key": RICH, "every rate type": RICH + "".join(of_every_type())} | {
     name: (mechanisms() / name).read_text(encoding="utf-8") for name in SHIPPED
 }
-PLAIN = {name: YAML(typ="safe").load(text) for name, text in TEXTS.items()}
+
+
+@cache
+def plain(name):
+    """The content of a text, which nothing here changes."""
+    return YAML(typ="safe").load(TEXTS[name])
+
+
+@cache
+def every_key():
+    return sorted({str(key) for name in TEXTS for path in keys(plain(name)) for key in path if isinstance(key, str)})
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +157,7 @@ def test_the_file_itself_is_read(name, file):
 @given(data=st.data())
 @settings(max_examples=8)
 def test_a_misspelt_key_is_named(name, file, data):
-    path = data.draw(st.sampled_from(list(keys(PLAIN[name]))))
+    path = data.draw(st.sampled_from(list(keys(plain(name)))))
     new = data.draw(misspelt(str(path[-1])).filter(lambda word: word.strip() and word not in siblings(name, path)))
     file.write_text(renamed(TEXTS[name], path, new), encoding="utf-8")
     with pytest.raises(InputError) as caught:
@@ -172,7 +183,6 @@ VALUES = st.one_of(
     st.text(max_size=6),
     st.sampled_from([[], {}, [[]], [1, 2], {"A": 1}, {"model": "NASA7", "data": [[1]]}, ["A(s)"], [{"x": "all"}]]),
 )
-KEYS = sorted({str(key) for plain in PLAIN.values() for path in keys(plain) for key in path if isinstance(key, str)})
 ODD = {
     "a control character": b"phases: \x07",
     "no text": b"\x89PNG\r\n\x1a\n\x00\x00",
@@ -241,10 +251,10 @@ def test_mutated_documents(examples, file):
     @given(name=st.sampled_from(list(TEXTS)), data=st.data())
     @settings(max_examples=examples, derandomize=True, suppress_health_check=list(HealthCheck))
     def run(name, data):
-        plain = PLAIN[name]
+        content = plain(name)
         for _ in range(data.draw(st.integers(1, 3))):
-            plain = mutated(plain, KEYS, VALUES, data)
-        is_read_or_refused(document.dump(document.from_plain(plain, Place())), file, data.draw(SOLVERS))
+            content = mutated(content, every_key(), VALUES, data)
+        is_read_or_refused(document.dump(document.from_plain(content, Place())), file, data.draw(SOLVERS))
 
     run()
 

@@ -367,18 +367,6 @@ def test_the_charge_of_a_sweep_of_the_potential_is_the_integral_of_its_current()
     production = CubicSpline(data["time"], data["production_Li_elyt"])
     charge = [production.integrate(0, t) for t in data["time"].values[1:]]
     np.testing.assert_allclose(data["made_Li_elyt"][1:], charge, rtol=3e-6)
-    # The polarisation curve, point by point.
-    anode = ct.Interface("lithium_ion_battery.yaml", "edge_anode_electrolyte")
-    electrons, others = anode.adjacent["electron"], YAML(typ="safe").load(ELECTROLYTE)["electrolyte"]["composition"]
-    anode.adjacent["anode"].X, anode.adjacent["electrolyte"].X = [0.5, 0.5], others
-    for phase in (anode, *anode.adjacent.values()):
-        phase.TP = 300.0, ct.one_atm
-    currents = []
-    for volts in data["V_electron"].values:
-        electrons.electric_potential = volts
-        currents.append(-anode.get_net_production_rates(electrons)[0] * ct.faraday)
-    assert min(currents) < 0 < max(currents)
-    np.testing.assert_allclose(data["i_electron"], currents, rtol=1e-8, atol=1e-9 * np.abs(currents).max())
 
 
 SMALL = """

@@ -84,18 +84,13 @@ def test_every_unit_follows_the_cf_conventions(suite, tmp_path):
     assert complaints(suite, tmp_path / "units.nc") == []
 
 
-@pytest.mark.parametrize(
-    ("attribute", "value", "complaint"),
-    [
-        ("units", "degrees of warmth", "units"),
-        ("standard_name", "warmth_of_contact", "standard_name"),
-    ],
-)
-def test_a_file_that_breaks_the_conventions_is_noticed(suite, tmp_path, attribute, value, complaint):
+def test_a_file_that_breaks_the_conventions_is_noticed(suite, tmp_path):
     broken = solved("exothermic").dataset.copy()
-    broken["T"].attrs[attribute] = value
+    broken["T"].attrs |= {"units": "degrees of warmth", "standard_name": "warmth_of_contact"}
     broken.to_netcdf(tmp_path / "broken.nc")
-    assert any(complaint in message for message in complaints(suite, tmp_path / "broken.nc"))
+    found = complaints(suite, tmp_path / "broken.nc")
+    for wrong in ("degrees of warmth", "warmth_of_contact"):
+        assert any(wrong in message for message in found), found
 
 
 def test_carries_the_exact_solution_and_the_residuals(solution):

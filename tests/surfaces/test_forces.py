@@ -1,9 +1,7 @@
 """Forces of pairs of points and of laws of the gap: closed forms, balance, order of convergence, limits."""
 
 import itertools
-import json
 import math
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -40,31 +38,11 @@ def pair(lower, upper, d, laws, rtol=1e-10):
     return interaction(Surface(lower), Surface(upper, True, d), laws, rtol)
 
 
-def spheres(c, R_1, R_2, m):
-    """Double integral of r^-m over two spheres whose centres are c apart; over a cavity and a sphere inside it alike.
-
-    The mean over a sphere of r^-m from a point at the distance c is that of (c + R cos)^-m, weighted by its potential.
-    """
-    c, R_1, R_2, m = map(mpmath.mpf, (c, R_1, R_2, m))
-
-    def inner(rho):
-        return 2 * mpmath.pi * R_2 / rho * ((rho + R_2) ** (2 - m) - abs(rho - R_2) ** (2 - m)) / (2 - m)
-
-    # Over the first sphere dA = 2 pi R_1 / c rho d rho.
-    return (
-        2 * mpmath.pi * R_1 / c * mpmath.quad(lambda rho: rho * inner(rho), mpmath.linspace(abs(c - R_1), c + R_1, 9))
-    )
-
-
 def closed(c, R_1, R_2, m):
+    """Double integral of r^-m over two spheres whose centres are c apart; for even m also over one in another."""
     ends = (c + R_1 + R_2, c + R_2 - R_1, c - R_2 + R_1, c - R_1 - R_2)
     sums = sum(sign * mpmath.mpf(end) ** (3 - m) for sign, end in zip((1, -1, -1, 1), ends, strict=True))
     return 4 * mpmath.pi**2 * R_1 * R_2 / (mpmath.mpf(c) * (2 - m) * (3 - m)) * sums
-
-
-def test_the_closed_form_is_the_integral():
-    for m in (4, 6, 10):
-        assert mpmath.almosteq(closed(3.7, 1, 2, m), spheres(3.7, 1, 2, m), 1e-20)
 
 
 @pytest.mark.parametrize("m", [4, 6, 10])
@@ -82,7 +60,7 @@ def test_two_spheres_are_closed_forms(d, m):
 @pytest.mark.parametrize("m", [4, 6])
 def test_a_sphere_in_a_cavity_is_a_closed_form_whichever_is_the_first(m):
     d, R, hollow = 0.01, 1.0, 3.0
-    exact = float(spheres(hollow - R - d, R, hollow, m))
+    exact = float(closed(hollow - R - d, R, hollow, m))
     for bodies in ((Sphere(R=R), Cavity(R=hollow)), (Cavity(R=hollow), Sphere(R=R))):
         assert pair(*bodies, d, [power(m)]).energy[0] == pytest.approx(exact, rel=1e-10)
 
@@ -116,19 +94,18 @@ def test_a_sphere_over_a_plane_is_the_law_that_is_there():
         assert found.force_1[0] == pytest.approx(-found.force_2[0], rel=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("name", "lower", "upper", "d", "rtol"),
-    [
-        ("parallel_cylinders", Cylinder(R=1.0, length=1.0), Cylinder(R=2.0), 0.3, 1e-10),
-        ("crossed_cylinders", Cylinder(R=1.0), Cylinder(R=2.0, turn=math.pi / 2), 0.3, 1e-5),
-        ("tilted_plates", Plane(length=1.0, width=0.7), Plane(length=0.8, width=1.0, tilt=0.2), 0.6, 1e-10),
-    ],
-)
-def test_cylinders_and_plates_are_integrals_of_twenty_digits(name, lower, upper, d, rtol):
-    """`python tests/surfaces/exact_pair_integrals.py` makes them."""
-    exact = json.loads(Path(__file__).with_name("exact_pair_integrals.json").read_text(encoding="utf-8"))[name]
-    assert len(exact) == 21
-    assert pair(lower, upper, d, [power(6)], rtol).energy[0] == pytest.approx(float(exact), rel=rtol)
+def test_cylinders_are_what_a_sum_around_both_of_them_gives():
+    """Along a line r^-6 gives 3 pi / (8 a^5), over a plane pi / (2 h^4), and the trapezium rule converges at once."""
+    d, R_1, R_2, n = 0.3, 1.0, 2.0, 480
+    one, other = np.meshgrid(*[2 * math.pi * np.arange(n) / n] * 2)
+    heights = [R * (1 - np.cos(angle)) for R, angle in ((R_1, one), (R_2, other))]
+    apart = np.hypot(R_1 * np.sin(one) - R_2 * np.sin(other), d + sum(heights))
+    area = R_1 * R_2 * (2 * math.pi / n) ** 2
+    parallel = area * np.sum(3 * math.pi / 8 * apart**-5)
+    crossed = area * np.sum(math.pi / 2 * (d + sum(heights)) ** -4)
+    lower, across = Cylinder(R=R_1, length=1.0), Cylinder(R=R_2, turn=math.pi / 2)
+    assert pair(lower, Cylinder(R=R_2), d, [power(6)]).energy[0] == pytest.approx(parallel, rel=1e-10)
+    assert pair(Cylinder(R=R_1), across, d, [power(6)], 1e-5).energy[0] == pytest.approx(crossed, rel=1e-5)
 
 
 def test_tilted_plates_are_the_sum_over_both_and_balance_whichever_carries_the_nodes():
