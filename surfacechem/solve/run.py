@@ -30,7 +30,7 @@ from surfacechem.model.system import System
 from surfacechem.solve import AUTO, CALLING_PYTHON, EXPLICIT, method, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.contract import Array, Guard, Index, Mask, Problem, Result, Solver, States, Status, among
-from surfacechem.solve.diagnose import ROUNDED_BACK, are_led_back, termination
+from surfacechem.solve.diagnose import ROUNDED_BACK, are_led_back, closest_margin, termination
 from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, carried, solve_together, with_start, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
@@ -692,14 +692,13 @@ class Model:
         """Return the outcome of a run and its reason, in words."""
         where = f"t = {result.t:.9g} s"
         if result.status is Status.FINISHED:
-            return (
-                "finished",
-                f"came to rest at t = {run.rest:.9g} s, a steady state"
-                if run.rest is not None
-                else f"reached the end at {where}",
-            )
+            rest = "" if run.rest is None else f"came to rest at t = {run.rest:.9g} s, a steady state"
+            return "finished", rest or f"reached the end at {where}"
         if result.status is Status.EVENT:
-            margin, at, y = self.margins[int(result.events.index[-1])], np.array([result.t]), result.y[None]
+            index, at, y = int(result.events.index[-1]), np.array([result.t]), result.y[None]
+            margin = self.margins[index]
+            if result.margins[index] > 0:  # it has passed zero by a jump, at the pole where another one ends
+                margin = closest_margin(self.system, self.program, self.margins, result) or margin
             inputs = self.inputs(result, at, y, result.ydot[None])
             if are_led_back(self.system, self.program, margin, at, y, inputs[:, 1 + 2 * len(result.y) :])[0]:
                 return "failed", f"{margin.reason} at {where}: {ROUNDED_BACK}"
