@@ -29,7 +29,7 @@ WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 """Write permissions of others."""
 
 MOST_FILES = 4096
-"""Largest number of files of one kind; at 5 to 100 kB each some 100 MB."""
+"""Number of files of one kind beyond which the older half is removed; at 5 to 100 kB each some 100 MB."""
 
 
 def cache_root() -> Path:
@@ -213,8 +213,9 @@ def from_file(
     with suppress(OSError):
         make_folder(folder)
         keep_file(path, sealed(content))
-        names = os.listdir(folder)
-        if len(names) > MOST_FILES:  # the older half is removed
+        # For one of sixteen names, which are digests: to list the folder takes longer than to store a file.
+        names = os.listdir(folder) if path.stem < "1" else []
+        if len(names) > MOST_FILES:
             for old in sorted((folder / name for name in names), key=os.path.getmtime)[: len(names) // 2]:
                 old.unlink(missing_ok=True)
     return found

@@ -86,12 +86,16 @@ def test_what_is_damaged_or_not_ours_is_found_again(folder, harm):
 
 def test_of_too_many_files_the_older_half_goes(folder, monkeypatch):
     monkeypatch.setattr(cache_folder, "MOST_FILES", 3)
+
+    def kept(x, value):
+        return cache_folder.from_file(folder / f"0{x}", lambda: value, bytes.decode, str.encode)
+
     for age, x in enumerate("abcd"):
-        cached(fingerprint(x), [], lambda x=x: x)
+        kept(x, x)
         for path in folder.iterdir():
             os.utime(path, (path.stat().st_mtime - 60,) * 2)
         assert len(list(folder.iterdir())) == (2 if age == 3 else age + 1)
-    assert [cached(fingerprint(x), [], lambda: "anew") for x in "dcb"] == ["d", "c", "anew"]
+    assert [kept(x, "anew") for x in "dcb"] == ["d", "c", "anew"]
 
 
 def test_a_folder_that_cannot_be_made_costs_nothing_but_time(tmp_path, monkeypatch):
