@@ -23,9 +23,8 @@ from surfacechem.compile.program import Function
 from surfacechem.expressions import derivative
 from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.system import System
-from surfacechem.solve.branches import zero
 from surfacechem.solve.contract import HEAT_STEPS, Array, Mask
-from surfacechem.solve.equilibria import Equilibria, Heat, Point, compiled, formulas
+from surfacechem.solve.equilibria import Equilibria, Heat, Point, compiled, formulas, zero
 from surfacechem.tolerances import ULPS
 
 Moments = Callable[[Array, Array], tuple[Array, Array]]

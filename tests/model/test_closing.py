@@ -33,7 +33,7 @@ from surfacechem.laws.longrange import (
 )
 from surfacechem.model.assemble import assemble
 from surfacechem.scene import Mounting
-from surfacechem.solve.branches import next_root, steps_ahead
+from surfacechem.solve.equilibria import next_root, steps_ahead
 from surfacechem.solve.run import Model, Run
 
 CLOSED = "the gap closed, and no potential bears the bodies in contact"

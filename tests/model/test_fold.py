@@ -20,7 +20,7 @@ from surfacechem.laws.factors import Power
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
-from surfacechem.solve.branches import come_to_rest
+from surfacechem.solve.equilibria import come_to_rest
 
 PHI, G_N, G_T = 0.1, 1e-8, 2e-8
 ZONE = XuNeedleman(Phi_n=PHI, g_0=G_N, g_t0=G_T)

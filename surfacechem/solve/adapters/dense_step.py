@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.solve.branches import zero
 from surfacechem.solve.contract import Array, Guard
+from surfacechem.solve.equilibria import zero
 from surfacechem.tolerances import FORMULA_EPS, SQRT_EPS
 
 GUARD_POINTS = 16

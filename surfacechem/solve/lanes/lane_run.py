@@ -36,10 +36,9 @@ from surfacechem.solve.lanes.layout import EXPLICIT_MEMORY, NUMBERS, ORDER, SIZE
 from surfacechem.solve.lanes.vector import absolute, any_lane, lanes, put, put_where, same, where
 from surfacechem.solve.radau.driver import FEWEST_CHECKS, LEAST_NORM
 from surfacechem.solve.radau.explicit import STIFF_STEPS
-from surfacechem.solve.radau.record import StepperRecord, laying_out
 from surfacechem.solve.radau.step import EVENT, FINISHED, LEFT, loosening
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
-from surfacechem.solve.radau.work import MARGINS, RATES, compiled, evaluate, row_of
+from surfacechem.solve.radau.work import MARGINS, RATES, StepperRecord, compiled, evaluate, laying_out, row_of
 from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
 
 MOST_TRIALS = 16

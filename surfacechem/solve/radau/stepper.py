@@ -231,7 +231,6 @@ _SOURCES = (
     "../contract",
     "../../tolerances",
     "stepper",
-    "record",
     "work",
     "linear",
     "roundoff",
