@@ -84,7 +84,7 @@ def ledger() -> Scene:
         PressureConductance(between=ENDS, h_c=1e4, H=1e9),
         GasGap(between=ENDS, k=0.026, M=3.7e-7),
         Radiation(between=ENDS, epsilon_1=0.8, epsilon_2=0.6),
-        path("upper", "surroundings", 12.0),
+        Radiation(between=("upper", "surroundings"), epsilon_1=0.9),
     ]
     loading = {**scene.loading, "g_n": Hold(level=2e-6)}
     interface = replace(scene.interface, loss=0.1)
@@ -99,6 +99,7 @@ def test_fluxes_by_channel_sum_lost_heat_is_booked_and_both_laws_hold():
         assert sum(parts) == pytest.approx(values[f"q_{k}"], rel=1e-13)
     across = [values[f"q_12_{channel}"] for channel in channels[:3]]
     assert sum(across) == pytest.approx(values["q_12"], rel=1e-13)
+    assert values["q_2a"] == pytest.approx(0.9 * STEFAN_BOLTZMANN * (values["T_2"] ** 4 - 280.0**4), rel=1e-12)
     books = audit(trajectory)
     assert books.energy_error < 1e-10
     assert books.entropy_error < 1e-10
@@ -121,9 +122,8 @@ def test_one_conductance_through_a_medium_is_twice_that_on_each_side():
     sides = [path("lower", "interface", 2 * h), path("interface", "upper", 2 * h)]
     second = solved(through_medium(sides), 0.0, 1.0, 3.0)
     assert first.result.outputs == pytest.approx(second.result.outputs, rel=1e-10)
-    values = first
-    T_1, T_2 = values["T_1"], values["T_2"]
-    assert values["q_t"] == pytest.approx(h * (T_2 - T_1), rel=1e-9)
+    T_1, T_2 = first["T_1"], first["T_2"]
+    assert first["q_t"] == pytest.approx(h * (T_2 - T_1), rel=1e-9)
 
 
 def test_mean_influx_against_its_exact_solution():
