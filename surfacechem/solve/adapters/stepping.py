@@ -25,6 +25,9 @@ FIRST_TOGETHER, TOGETHER_GROWTH, MOST_TOGETHER = 16, 4, 256
 event are wasted; between 64 and 256 the maximum makes no difference to a run of a hundred reactions.
 """
 
+MOST_INPUTS = 2**17
+"""Largest number of inputs of these evaluations, a megabyte: what a cache does not hold is no faster together."""
+
 LONGEST_FIRST = 1e3
 """Largest first change of a state that its rate may predict, in units of the state."""
 
@@ -268,17 +271,18 @@ class _Run:
 
     def _to_event(self, method: Method, end: float) -> list[int]:
         """Step until an event, the end, or the end of the budget; return the margins that fired."""
+        inputs = len(NODES) * self.view.program.n_inputs
         # Algebraic variables are searched from those of the last step, which must be close: one step at a time.
+        largest = 1 if len(self.view.algebraic) else max(FIRST_TOGETHER, min(MOST_TOGETHER, MOST_INPUTS // inputs))
         eventful = bool(self.fired) or self.problem.margin_peaks is not None
-        most = FIRST_TOGETHER if eventful else method.together
-        start, most = self.t, 1 if len(self.view.algebraic) else most
+        start, most = self.t, min(largest, FIRST_TOGETHER if eventful else method.together)
         while self.t < end and self._over_budget() is None:
             before = time.perf_counter()
             steps = method.several(self._within_budget(most))
             self.stepping += time.perf_counter() - before
             if not steps.times[1] > self.t:
                 raise StepError("the step size fell to zero")
-            most = 1 if len(self.view.algebraic) else min(TOGETHER_GROWTH * most, MOST_TOGETHER)
+            most = min(TOGETHER_GROWTH * most, largest)
             inside = self._inside(steps, min(float(steps.times[-1]), end))
             if self.t == start:
                 self._check_first(inside)
