@@ -60,8 +60,7 @@ app = typer.Typer(
 )
 
 
-def tell_version(wanted: bool) -> None:
-    """Print the version and end, if wanted."""
+def _version(wanted: bool) -> None:
     if wanted:
         from surfacechem.documents.cache_folder import version
 
@@ -71,9 +70,7 @@ def tell_version(wanted: bool) -> None:
 
 @app.callback()
 def main(
-    version: Annotated[
-        bool, Option("--version", callback=tell_version, is_eager=True, help="Print the version.")
-    ] = False,
+    version: Annotated[bool, Option("--version", callback=_version, is_eager=True, help="Print the version.")] = False,
 ) -> None:
     """Contact interfaces that bond, slide, break and heat."""
 

@@ -566,6 +566,12 @@ class System:
         )
 
     @cached_property
+    def least_states(self) -> Array:
+        """Least possible values of the states: zero for bonds, minus infinity for others; shape (states,)."""
+        bonds = {account.law for account in self.ledger if account.kind == "bonds"}
+        return np.array([0.0 if state.name in bonds else -np.inf for state in self.states])
+
+    @cached_property
     def energy_has_histories(self) -> bool:
         """True if the total energy depends explicitly on time, as under a prescribed load."""
         return self.t in self.definitions[symengine.Symbol("E_total")].free_symbols

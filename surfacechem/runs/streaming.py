@@ -84,7 +84,7 @@ class ChunkRuns:
         """Ways to compute runs as arrays, in the order in which they are tried; the rest is solved run by run."""
         self.arrays = arrays if self.solvers else None
 
-    @property
+    @cached_property
     def record(self) -> tuple[str, str, str]:
         """Plan, kept results and changes as text."""
         return self.plan.record, json.dumps(asdict(self.keep)), json.dumps(dict(self.changes))

@@ -356,9 +356,7 @@ class Trajectory:
     @cached_property
     def within_bounds(self) -> Trajectory:
         """The trajectory with bonding states that roundoff has made negative set to zero."""
-        result, steps, system = self.result, self.result.steps, self.model.system
-        bonds = {account.law for account in system.ledger if account.kind == "bonds"}
-        least = np.array([0.0 if state.name in bonds else -np.inf for state in system.states])
+        result, steps, least = self.result, self.result.steps, self.model.system.least_states
         if (result.outputs >= least).all() and (steps is None or (steps.y >= least).all()):
             return self
         steps = steps and replace(steps, y=np.maximum(steps.y, least))
