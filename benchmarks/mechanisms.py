@@ -4,7 +4,8 @@ Mechanisms are random: coverages that turn into one another at a constant temper
 over four decades. `python benchmarks/mechanisms.py` prints a table and writes benchmarks/results/mechanisms.csv; times
 are those of the processor, the least of many runs in turn. Errors are against the compiled stepper at a tolerance of
 1e-13. What is "bare" keeps no balances, as nothing else but ours does. A run of ours has a longest step; with that a
-reactor by itself takes the same steps as `solver: cantera`.
+reactor by itself takes the same steps as `solver: cantera`. What was compiled before is read from the cache; the table
+of the documentation is from an empty one.
 """
 
 import csv
