@@ -372,16 +372,20 @@ def log_fraction(x: Expression) -> Expression:
 
 
 def mixing(x: Expression) -> Expression:
-    """Fraction times its logarithm, x ln x, with derivatives ln x + 1 and 1/x.
+    """Fraction times its logarithm, x ln x, with derivatives ln x + 1 and 1/x; its tangent from FRACTION_FLOOR on.
 
     The derivatives of a product with a guarded ln x contain x/x^2, which is not finite near zero.
 
+    >>> import symengine
+    >>> x = symengine.Symbol("x")
     >>> mixing(1.0), mixing(0.5) == -0.5 * math.log(2.0)
     (0.0, True)
+    >>> float(derivative(mixing(x), x).subs({x: 0})) == 1 + log_fraction(0.0)  # else rates at zero are off by e
+    True
     """
     if not is_symbolic(x):
         return x * log_fraction(x)
-    return where(x > FRACTION_FLOOR, x * symengine.log(x), math.log(FRACTION_FLOOR) * x)
+    return where(x > FRACTION_FLOOR, x * symengine.log(x), (math.log(FRACTION_FLOOR) + 1) * x)
 
 
 def log_sum(logarithms: Iterable[Expression]) -> Expression:
