@@ -28,7 +28,7 @@ import surfacechem.runs.simulation; done("import the package")
 simulation = surfacechem.runs.simulation.load(sys.argv[1]); done("read and check the case")
 simulation.system; done("assemble the equations")
 simulation.model; done("compile the equations")
-from surfacechem.solve.radau import stepper; stepper.LOOP.load_briefly(); stepper.LOOP.load(); done("load the stepper")
+from surfacechem.solve.radau import stepper; stepper.LOOP.load(); done("load the stepper")
 solution = simulation.run(); done("solve, and again for the error")
 with tempfile.TemporaryDirectory() as folder:
     solution.write(folder + "/run.nc"); done("write the dataset (netCDF4)")

@@ -261,21 +261,19 @@ def wait_for(work: Callable[[], R], tick: Callable[[], None] = lambda: None) -> 
         pool.shutdown(wait=False)
 
 
-def load_stepper(talk: bool | None = None, brief: bool = True, waits: bool = False) -> None:
-    """Say so if the stepper, or more, has to be compiled; ``brief`` loads it for few calls, without its compiler."""
+def tell_of_compilation(talk: bool | None = None, waits: bool = False) -> None:
+    """Say so if the stepper, or more, has to be compiled."""
     from surfacechem.solve.radau import stepper
 
-    if brief:
-        stepper.LOOP.load_briefly()
     if talk is not False and (waits or not stepper.LOOP.is_compiled):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
 
 
-def solve(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: bool = False) -> R:
+def solve(run: Callable[[], R], talk: bool | None, waits: bool = False) -> R:
     """Return the solution with its columns and audit computed, so that only writing is left.
 
-    ``talk`` is the option of the command line, ``brief`` True if the stepper is called only a few times, ``waits`` True
-    if more than the stepper has to be compiled. A terminal shows a progress bar after a while.
+    ``talk`` is the option of the command line, ``waits`` True if more than the stepper has to be compiled. A
+    terminal shows a progress bar after a while.
     """
     from surfacechem.cli.terminal import progress_bar
 
@@ -284,7 +282,7 @@ def solve(run: Callable[[], R], talk: bool | None, brief: bool = False, waits: b
         getattr(found, "columns", None)  # computed on first access
         return found
 
-    load_stepper(talk, brief, waits)
+    tell_of_compilation(talk, waits)
     with progress_bar(talk) as bar:
         bar.tell("running")
         return wait_for(whole, bar.tick)
@@ -337,7 +335,7 @@ def write_store(
     with client_at(cluster) as client:
         stream = prepared()
         try:
-            store = solve(lambda: stream.run(None, client, log_progress()), talk, brief=True, waits=stream.chunks.waits)
+            store = solve(lambda: stream.run(None, client, log_progress()), talk, waits=stream.chunks.waits)
             errors = solve(stream.check, talk)
         except SignalledError as error:
             if file:

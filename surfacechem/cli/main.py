@@ -32,13 +32,13 @@ from surfacechem.cli.commands import (
     law_names,
     leave_with,
     load_case,
-    load_stepper,
     part_of,
     plan_of_runs,
     refuse_unwritable,
     run_settings,
     solve,
     split_list,
+    tell_of_compilation,
     write_store,
     written_to,
 )
@@ -171,7 +171,7 @@ def check(
     with simulation.case.locating():
         problem = model.problem(settings, values)
     if model.program.rates is None:  # its search finds the start
-        load_stepper()
+        tell_of_compilation()
     start, end = consistent_start(model, values), settings.times[-1]
     numbers = groups(model, scene, values, start, end)
     found = [*warnings(system), *start_warnings(model, problem, start, end)]
@@ -214,7 +214,7 @@ def run(
     settings = run_settings(simulation, solver, rtol, accuracy)
     target = output or Path(f"{simulation.case.name}.nc")
     refuse_unwritable(dataset_path(target), read=[simulation.case.file])
-    solution = solve(lambda: simulation.run(run=settings, error=error), talk, brief=True)
+    solution = solve(lambda: simulation.run(run=settings, error=error), talk)
     solution.write(target)  # also if the run failed: its partial result helps to find the reason
     if talk is not False:
         show(run_summary(solution, target, details=talk is True))
@@ -261,7 +261,7 @@ def plot(
         own = f"{own.removesuffix('-sweep')}-sweep"  # a sweep and a run of one name have a figure each
     target = output or Path("comparison.png" if len(sources) > 1 else f"{own}.png")
     check_picture(target)
-    solutions = {case: solve(load_case(case, changes).run, talk, brief=True) for case in sources if case not in shown}
+    solutions = {case: solve(load_case(case, changes).run, talk) for case in sources if case not in shown}
     shown |= {case: solution.data for case, solution in solutions.items()}
     figure = plots.figure([shown[source] for source in sources], split_list(variables), against, celsius)
     plots.write(figure, target)
@@ -291,7 +291,7 @@ def report(
         raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
     target = run_report.report_path(output or f"{Path(source).stem}.html")
     refuse_unwritable(target)
-    solution = None if is_file else solve(load_case(source, changes).run, talk, brief=True)
+    solution = None if is_file else solve(load_case(source, changes).run, talk)
     solve(lambda: run_report.write(solution.data if solution else source, target), talk)
     if talk is not False:
         typer.echo(str(target))
@@ -487,7 +487,7 @@ def rerun(
     record = again.read(file)
     if output:
         refuse_unwritable(dataset_path(output), read=[file])
-    solution = solve(lambda: again.run_again(record, allow_code), talk, brief=True)
+    solution = solve(lambda: again.run_again(record, allow_code), talk)
     if output:
         solution.write(output)
     different = again.differences(record, solution)

@@ -13,22 +13,21 @@ folder instead of being compiled.
 import gc
 import hashlib
 import os
-import pickle
 import platform
 import shutil
 import sys
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from surfacechem.documents import cache_folder
 from surfacechem.documents.cache_folder import cache_root, keep_file, make_folder, sealed, unsealed, version
 
-NUMBA_FILE = "kernel.numba"
-"""File that Numba loads; other files of the folder that begin with `kernel.` contain the same code in other forms."""
-
+CODE_FILE = "kernel.object"
+"""File of the machine code."""
 
 SHIPPED_FOLDER = Path(__file__).with_name("shipped")
 """Folder of a wheel with code that was compiled when it was built."""
@@ -40,13 +39,12 @@ machines.
 """
 
 
+@cache
 def processor() -> str:
-    """Return the name of the processor; if unknown, Numba's list of instruction sets still protects the code."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            return next(line for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor()
+    """Return the name of the processor and its instruction sets, of which a virtual machine may hide some."""
+    import llvmlite.binding as llvm
+
+    return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
 
 
 def kernel_folder(sources: Sequence[Path]) -> Path:
@@ -77,13 +75,11 @@ def copy_shipped(folder: Path, sources: Sequence[Path]) -> None:
     import llvmlite.binding as llvm
 
     _, needed = PLATFORMS.get(platform.machine().lower(), ("", ()))
-    # The file by which the folder counts as filled comes last.
-    files = sorted(shipped_folder(sources, SHIPPED_FOLDER).glob("kernel.*"), key=lambda path: path.name == NUMBA_FILE)
-    if files and {*needed} <= {name for name, has in llvm.get_host_cpu_features().items() if has}:
+    if {*needed} <= {name for name, has in llvm.get_host_cpu_features().items() if has}:
         with suppress(OSError):  # without a cache each process compiles
+            code = (shipped_folder(sources, SHIPPED_FOLDER) / CODE_FILE).read_bytes()
             make_folder(folder)
-            for path in files:
-                keep_file(folder / path.name, path.read_bytes())
+            keep_file(folder / CODE_FILE, code)
 
 
 def ship(sources: Sequence[Path], place: Path, load: Callable[[], object]) -> None:
@@ -91,14 +87,7 @@ def ship(sources: Sequence[Path], place: Path, load: Callable[[], object]) -> No
     name, _ = PLATFORMS.get(platform.machine().lower(), ("generic", ()))
     os.environ |= {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""}
     load()
-    from numba.core import serialize
-
-    numbas: Any = serialize
-    made, target = kernel_folder(sources), shipped_folder(sources, place)
-    shutil.copytree(made, target)
-    content = _content(made)
-    assert content is not None
-    keep_file(target / NUMBA_FILE, sealed(numbas.dumps((None, pickle.loads(content)[1]))))
+    shutil.copytree(kernel_folder(sources), shipped_folder(sources, place))
 
 
 def code_file(origins: Iterable[str]) -> Path:
@@ -108,68 +97,33 @@ def code_file(origins: Iterable[str]) -> Path:
     return cache_root() / "code" / digest.hexdigest()[:32]
 
 
-def is_filled(folder: Path) -> bool:
-    """True if the folder contains machine code that would be loaded."""
-    return untrusted(folder) is None and _content(folder) is not None
-
-
-def _content(folder: Path) -> bytes | None:
-    """Return the content of the file that Numba loads; None if any file made with it is damaged."""
-    try:
-        contents = {path.name: unsealed(path.read_bytes()) for path in folder.glob("kernel.*")}
-    except OSError:
-        return None
-    return None if None in contents.values() else contents.get(NUMBA_FILE)
-
-
 def untrusted(folder: Path) -> str | None:
     """Return the reason why code in this folder could be another user's; None if it cannot, or without a folder."""
     inside = (Path(place, name) for place, folders, files in os.walk(folder) for name in (*folders, *files))
     return cache_folder.untrusted((folder, *inside))
 
 
-class _KernelCache:
-    """Cache in which Numba looks up a function's machine code: one file, independent of the place of the sources."""
+def stored_code(folder: Path) -> bytes | None:
+    """Return the code that is stored in a folder; None if there is none, or none that can be trusted."""
+    with suppress(OSError):
+        return None if untrusted(folder) else unsealed((folder / CODE_FILE).read_bytes())
+    return None
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.cache_path = str(folder)
 
-    def load_overload(self, _signature: Any, context: Any) -> Any:
-        """Load code compiled for this processor or, in a wheel, for all; None if there is no valid code."""
-        from numba.core.compiler import CompileResult
-
-        content = _content(self.folder)
-        if content is None:
-            return None
-        context.refresh()
-        processor, reduced = pickle.loads(content)
-        result: Any = CompileResult
-        fits = processor is None or processor == context.codegen().magic_tuple()
-        return result._rebuild(context, *reduced) if fits else None
-
-    def save_overload(self, _signature: Any, compiled: Any) -> None:
-        """Store the code that has just been compiled."""
-        from numba.core import serialize
-
-        numbas: Any = serialize
-        if compiled.library.has_dynamic_globals:
-            _warn(self.folder, "it holds addresses of this process")
-            return
-        data = sealed(numbas.dumps((compiled.codegen.magic_tuple(), compiled._reduce())))
+def store_code(folder: Path, code: bytes) -> None:
+    """Store code that has just been compiled; warn if the folder cannot be written to or trusted."""
+    if (problem := untrusted(folder)) is None:
         try:
-            make_folder(self.folder)
-            keep_file(self.folder / NUMBA_FILE, data)
+            make_folder(folder)
+            keep_file(folder / CODE_FILE, sealed(code))
         except OSError as error:
-            _warn(self.folder, str(error))
-
-
-def _warn(folder: Path, problem: str) -> None:
-    warnings.warn(
-        f"The compiled stepper cannot be kept in {folder} ({problem}); it is compiled for this process alone. "
-        "SURFACECHEM_CACHE names another folder.",
-        stacklevel=3,
-    )
+            problem = str(error)
+    if problem is not None:
+        warnings.warn(
+            f"The compiled stepper cannot be kept in {folder} ({problem}); it is compiled for this process alone. "
+            "SURFACECHEM_CACHE names another folder.",
+            stacklevel=2,
+        )
 
 
 def _numba_patches(parts: Collection[str]) -> list[tuple[Any, str, Any]]:
@@ -249,21 +203,18 @@ def _patched_numba(parts: Collection[str]) -> Iterator[None]:
             gc.enable()
 
 
-def compile_kernel(function: Callable[..., None], signature: Any, folder: Path, parts: Collection[str] = ()) -> Any:
-    """Return the compiled function: from the cache if it is valid and trusted, else compiled, and stored if possible.
+def compile_kernel(function: Callable[[int, int], None], parts: Collection[str] = ()) -> bytes:
+    """Return the machine code of a function of two integers, preceded by a line with its name.
 
-    ``parts`` are the names of the compiled functions that only the kernel calls.
+    ``parts`` are the names of the compiled functions that only this one calls.
     """
     import numba
     from numba.core.compiler_lock import global_compiler_lock
 
-    kernel: Any = numba.njit(nogil=True, error_model="numpy")(function)
-    problem = untrusted(folder)
-    if problem is None:
-        kernel._cache = _KernelCache(folder)
-    else:
-        _warn(folder, problem)
+    compile_alone: Any = numba.njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    kernel = compile_alone(function)
     with global_compiler_lock, _patched_numba(parts):
-        kernel.compile(signature)
-    kernel.disable_compile()
-    return kernel
+        kernel.compile("void(int64, int64)")
+    (made,) = kernel.overloads.values()
+    _, _, (code, _) = made.library.serialize_using_object_code()
+    return b"%s\n%s" % (made.fndesc.llvm_func_name.encode(), code)

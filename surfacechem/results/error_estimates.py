@@ -187,8 +187,12 @@ def _event_errors(trajectory: Trajectory, reference: Reference, second: Trajecto
     end = reference.end_time
     if all(np.all(np.abs(times - end) <= SQRT_EPS * times) for times in found.values()):  # the solution ends there
         expected = {name: np.full(len(times), end) for name, times in found.items()}
-    else:  # exact solutions have no list of events
-        expected = event_times(second or _second_events(trajectory))
+    else:  # exact solutions have no list of events: a second run finds them, and no step depends on its outputs
+        run = trajectory.run
+        brief = run.second(
+            second_tolerance(run.rtol), times=(0.0, run.times[-1]), picture=None, looks=0.0, accounts=False
+        )
+        expected = event_times(second or trajectory.model.solve_values(brief, trajectory.values))
     return event_errors(found, expected, trajectory.run.times[-1])
 
 
@@ -237,13 +241,6 @@ def second_settings(trajectory: Trajectory, known: bool = False) -> Run:
 def _second(trajectory: Trajectory, known: bool = False) -> Trajectory:
     """Make the second run."""
     return trajectory.model.solve_values(second_settings(trajectory, known), trajectory.values)
-
-
-def _second_events(trajectory: Trajectory) -> Trajectory:
-    """Make the second run for its events alone: no step depends on the outputs."""
-    run, ends = trajectory.run, (0.0, trajectory.run.times[-1])
-    brief = run.second(second_tolerance(run.rtol), times=ends, picture=None, looks=0.0, accounts=False)
-    return trajectory.model.solve_values(brief, trajectory.values)
 
 
 def against_tighter(trajectory: Trajectory) -> Accuracy:

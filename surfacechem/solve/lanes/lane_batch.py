@@ -52,7 +52,7 @@ def run(batch: Any, method: "LaneMethod") -> None:
     memory = np.zeros(words + LANES, np.int64)
     # A vector that lies across two lines of the cache takes twice the time.
     first = -memory.ctypes.data // memory.itemsize % LANES
-    method.loop.load()(0, len(batch.counts), memory[first : first + words], tuple(batch))
+    method.loop.load()(len(batch.counts), (*batch, memory[first : first + words]))
 
 
 @lru_cache(maxsize=64)
@@ -79,7 +79,7 @@ def _method(words: str, memory: Mapping[str, Any], module: str, function: str, *
     here = Path(__file__).parent
     own = [here / f"{name}.py" for name in ("vector", "layout", "lane_step", "lane_guards", "lane_run", *parts)]
     sources = [*stepper.sources(), *(here.parent.parent / "compile" / name for name in CODE), *own]
-    return LaneMethod(words, stepper.Loop(sources, f"{__package__}.{module}", function, brief=True), memory)
+    return LaneMethod(words, stepper.Loop(sources, f"{__package__}.{module}", function), memory)
 
 
 EXPLICIT = _method("explicit steps of order 8", EXPLICIT_MEMORY, "lane_run", "run_explicitly")

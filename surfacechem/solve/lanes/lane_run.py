@@ -416,19 +416,17 @@ def _step(w: Any) -> None:
 
 
 @compiled
-def run_through(w: Any, first: int, last: int) -> None:
-    """Solve runs first to last - 1 of a batch. The result of a run depends neither on its neighbours nor on the
-    threads.
-    """
+def run_through(w: Any, count: int) -> None:
+    """Solve the runs of a batch. The result of a run depends neither on its neighbours nor on the threads."""
     w.loose = loosening(w.rtol)
-    following = first
+    following = 0
     for lane in range(LANES):
         w.over[lane] = -1
         _leave(w, lane)
-    while w.free < LANES or following < last:
+    while w.free < LANES or following < count:
         # Runs begin together, so that several share each evaluation at starts and ends.
         for lane in range(LANES if w.free >= FREE_LANES else 0):
-            if w.run[lane] < 0 and following < last:
+            if w.run[lane] < 0 and following < count:
                 _begin(w, lane, following)
                 following += 1
         if any_lane(lanes(w.fresh) > 0.5):
@@ -446,8 +444,8 @@ def loop_of(name: str, end_stage: int, power: float, memory: Mapping[str, Any], 
     method = {"end_stage": end_stage, "least_root": LEAST_NORM**power, **{part.__name__: part for part in parts}}
     lay_out = laying_out(StepperRecord(name, SIZES, NUMBERS, memory, method))
 
-    def run(first: int, last: int, memory: Any, batch: Any) -> None:
-        run_through(lay_out(batch, memory), first, last)
+    def run(count: int, table: int) -> None:
+        run_through(lay_out(table), count)
 
     return run
 
@@ -455,4 +453,4 @@ def loop_of(name: str, end_stage: int, power: float, memory: Mapping[str, Any], 
 _STEPS = root_of, try_step, propose_size, is_noise, find_stiff, keep_step
 _INSIDE = put_roughly, interpolate, find_defects, check_outputs
 run_explicitly = loop_of("ExplicitLanes", END_STAGE, 0.125, EXPLICIT_MEMORY, *_STEPS, *_INSIDE)
-"""Solve runs first to last - 1 of a batch."""
+"""Solve the runs of a batch."""

@@ -566,4 +566,4 @@ def keep_step(w: Any) -> None:
 _STEPS = root_of, try_step, propose_size, is_noise, find_stiff, keep_step
 _INSIDE = put_roughly, interpolate, find_defects, check_outputs
 run_by_radau = loop_of("RadauLanes", STAGES, POWER, RADAU_MEMORY, *_STEPS, *_INSIDE)
-"""Solve runs first to last - 1 of a batch."""
+"""Solve the runs of a batch."""

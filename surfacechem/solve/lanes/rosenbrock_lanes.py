@@ -113,4 +113,4 @@ def find_defects(w: Any, lane: int, x: Any) -> None:
 _STEPS = root_of, try_step, propose_size, radau_lanes.is_noise, find_stiff, keep_step
 _INSIDE = put_roughly, interpolate, find_defects, radau_lanes.check_outputs
 run_linearly = loop_of("RosenbrockLanes", END_STAGE, POWER, ROSENBROCK_MEMORY, *_STEPS, *_INSIDE)
-"""Solve runs first to last - 1 of a batch."""
+"""Solve the runs of a batch."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from llvmlite import ir
@@ -72,20 +73,21 @@ def _operation(operation: Any, kind: Any, result: Any, emit: Callable[[Any, Any,
         _lower(operation, *pair)(lowered)
 
 
-def _arithmetic(name: str) -> Callable[[Any, Any, Any], Any]:
-    return lambda builder, a, b: getattr(builder, name)(a, b)
+def _compare(sign: str, builder: Any, a: Any, b: Any) -> Any:
+    return builder.sext(builder.fcmp_ordered(sign, a, b), INTEGERS)
 
 
-def _comparison(sign: str) -> Callable[[Any, Any, Any], Any]:
-    return lambda builder, a, b: builder.sext(builder.fcmp_ordered(sign, a, b), INTEGERS)
-
-
-for _operator, _name in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
-    _operation(getattr(operator, _operator), LANE, LANE, _arithmetic(_name))
-for _operator, _name in (("lt", "<"), ("le", "<="), ("gt", ">"), ("ge", ">="), ("eq", "==")):
-    _operation(getattr(operator, _operator), LANE, MASK, _comparison(_name))
-_operation(operator.and_, MASK, MASK, lambda builder, x, y: builder.and_(x, y))
-_operation(operator.or_, MASK, MASK, lambda builder, x, y: builder.or_(x, y))
+_operation(operator.add, LANE, LANE, ir.IRBuilder.fadd)
+_operation(operator.sub, LANE, LANE, ir.IRBuilder.fsub)
+_operation(operator.mul, LANE, LANE, ir.IRBuilder.fmul)
+_operation(operator.truediv, LANE, LANE, ir.IRBuilder.fdiv)
+_operation(operator.lt, LANE, MASK, partial(_compare, "<"))
+_operation(operator.le, LANE, MASK, partial(_compare, "<="))
+_operation(operator.gt, LANE, MASK, partial(_compare, ">"))
+_operation(operator.ge, LANE, MASK, partial(_compare, ">="))
+_operation(operator.eq, LANE, MASK, partial(_compare, "=="))
+_operation(operator.and_, MASK, MASK, ir.IRBuilder.and_)
+_operation(operator.or_, MASK, MASK, ir.IRBuilder.or_)
 
 
 @_typed(operator.invert)
@@ -220,14 +222,9 @@ def _unary(emit: Callable[[Any, Any], Any]) -> Any:
     return apply
 
 
-def _without_sign(builder: Any, value: Any) -> Any:
-    sizes = builder.and_(builder.bitcast(value, INTEGERS), _Constant(INTEGERS, [2**63 - 1] * LANES))
-    return builder.bitcast(sizes, VECTOR)
-
-
 same = _unary(_spread)
 """Broadcast one number to eight lanes."""
-absolute = _unary(_without_sign)
+absolute = _unary(lambda builder, value: by_vector(builder, "fabs", value))
 """Absolute values of eight numbers."""
 floor = _unary(lambda builder, value: by_vector(builder, "floor", value))
 """Round eight numbers down to whole numbers."""

@@ -310,7 +310,7 @@ def _reset_history(w: Any, i: int) -> None:
     clear(w.q)
     clear(w.ydot)
     clear(w.noise)
-    w.explicit, w.stiff_steps, w.h_refused = w.explicitly, 0, 0.0
+    w.explicit, w.stiff_steps, w.h_refused = int(w.explicitly), 0, 0.0
     w.first_event, w.steps_before, w.rejected_before = w.counts[i, EVENTS], w.steps, w.rejected
 
 
@@ -331,7 +331,7 @@ def _run_segments(w: Any, i: int) -> int:
     for segment in range(segments.shape[0] - 1):
         w.base, w.tau = segments[segment], 0.0
         copy(w.parameters[i, segment], w.inputs[1 + 2 * w.n :])
-        more = w.continued != 0 or segment + 2 < segments.shape[0]
+        more = w.continued != 0.0 or segment + 2 < segments.shape[0]
         status = _run_segment(w, i, segments[segment + 1], more)
         if status != GOOD:
             return status
@@ -494,15 +494,15 @@ def _run(w: Any, i: int) -> None:
         counts[FIRST_COUNTER + k] = counter
 
 
-def run_batch(first: int, last: int, memory: Any, batch: Any) -> None:
-    """Solve runs first to last - 1 of a batch; without segments make the rows of ``ends`` consistent.
+def run_batch(count: int, table: int) -> None:
+    """Solve the runs of a batch; without segments make the rows of ``ends`` consistent.
 
-    The fields of the batch come as a plain tuple, since Numba takes twice as long to type a named one. Every run writes
-    to its own rows and each thread has its own memory, so the result does not depend on the threads.
+    ``table`` is the address of the addresses of the arrays of the batch and of the memory. Every run writes to its own
+    rows and each thread has its own memory, so the result does not depend on the threads.
     """
-    w = lay_out(batch, memory)
+    w = lay_out(table)
     w.loose = loosening(w.rtol)
-    for i in range(first, last):
+    for i in range(count):
         if w.segments.shape[1] > 0:
             _run(w, i)
             continue

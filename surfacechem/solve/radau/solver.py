@@ -124,13 +124,9 @@ def batch_of(
         jumps = np.empty((count, jump_rows, 3 + problem.edges.sizes[0] + 2 * program.n_inputs))
     return Batch(
         *_with_edges(tables or (program.explicit_tables if explicit else program.tables), problem.edges),
-        problem.rtol,
+        np.array((problem.rtol, explicit, problem.continued, problem.line_error, problem.elapsed)),
         _floats(problem.atol),
-        int(explicit),
         _kinds(problem.margins, problem.active),
-        int(problem.continued),
-        problem.line_error,
-        problem.elapsed,
         np.array(max_steps or (problem.max_steps,)),
         *runs,
         np.empty((count, 1 + 2 * n + q + m)),
@@ -336,7 +332,7 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
     rows, nothing = np.zeros((1, 0)), _no_rows(len(ends))
     return Batch(
         *program.tables, NO_EDGES.words,
-        1.0, np.ones(program.n), 0, _kinds(()), 0, 0.0, 0.0, np.empty(0, np.int64),
+        np.array((1.0, 0.0, 0.0, 0.0, 0.0)), np.ones(program.n), _kinds(()), np.empty(0, np.int64),
         ends, table, np.zeros(0), rows, rows, rows, ends, counts,
         *(nothing,) * 4, rows, *(nothing,) * 2,
     )  # fmt: skip

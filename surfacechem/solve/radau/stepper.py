@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.compile import objectcode
-from surfacechem.compile.cache import compile_kernel, copy_shipped, is_filled, kernel_folder
+from surfacechem.compile.cache import compile_kernel, copy_shipped, kernel_folder, store_code, stored_code
+from surfacechem.compile.objectcode import Kernel
 from surfacechem.solve.contract import CHATTER
 
 EDGE_TABLES: dict[str, tuple[Any, int]] = {
@@ -46,18 +46,10 @@ BATCH: dict[str, tuple[Any, int]] = {
     # address and lengths of each table of edges: one array is unpacked faster than seven
     "edge_words": (np.int64, 1),
     # the method
-    "rtol": (float, 0),
+    "settings": (float, 1),
     "atol": (float, 1),
-    # true if steps are explicit as long as the equations are not stiff
-    "explicitly": (int, 0),
     # guards: a row (terminal, direction, smooth, strict, active, domain) for each
     "kinds": (np.int64, 2),
-    # true if other problems continue the runs
-    "continued": (int, 0),
-    # allowed error of linear interpolation between stored states, as a part of their range; 0: none are added
-    "line_error": (float, 0),
-    # time from the start of the run to that of the problem
-    "elapsed": (float, 0),
     # most steps, one number for all runs or one each
     "max_steps": (np.int64, 1),
     # the runs; all but the first two have a single row if it is the same for all runs
@@ -82,6 +74,19 @@ BATCH: dict[str, tuple[Any, int]] = {
     "jumps": (float, 3),
 }
 """Entries of a batch of runs: type and number of axes. The first axis of the last two groups is the run."""
+
+SETTINGS = (
+    "rtol",
+    # true if steps are explicit as long as the equations are not stiff
+    "explicitly",
+    # true if other problems continue the runs
+    "continued",
+    # allowed error of linear interpolation between stored states, as a part of their range; 0: none are added
+    "line_error",
+    # time from the start of the run to that of the problem
+    "elapsed",
+)
+"""Settings of a batch, in this order."""
 
 _named: Any = namedtuple
 Batch: Any = _named("Batch", BATCH)
@@ -259,9 +264,9 @@ class Loop:
     The module of the function is imported only for compilation, as it imports Numba.
     """
 
-    def __init__(self, sources: Sequence[Path], module: str, function: str, brief: bool = False) -> None:
-        self._sources, self._module, self._function, self._brief = sources, module, function, brief
-        self._kernel: Any = None
+    def __init__(self, sources: Sequence[Path], module: str, function: str) -> None:
+        self._sources, self._module, self._function = sources, module, function
+        self._kernel: Kernel | None = None
         self._lock = threading.Lock()
 
     @property
@@ -274,40 +279,20 @@ class Loop:
     @property
     def is_compiled(self) -> bool:
         """True if it can be loaded instead of compiled (which takes some ten seconds, once)."""
-        return self._kernel is not None or is_filled(self.folder)
+        return self._kernel is not None or stored_code(self.folder) is not None
 
-    def load(self) -> Any:
-        """Return the compiled function; a ``brief`` loop without its compiler: its calls are slower, but few."""
-        if self._kernel is None:
-            with self._lock:
-                self._kernel = self._kernel or (self._brief and objectcode.load(self.folder)) or self._compiled()
-        return self._kernel
-
-    def load_briefly(self) -> None:
-        """Load it without its compiler if possible: loaded sooner, slower to call; for a process with few runs."""
+    def load(self) -> Kernel:
+        """Return the compiled function."""
         with self._lock:
-            self._kernel = self._kernel or objectcode.load(self.folder)
+            if self._kernel is None:
+                code = stored_code(self.folder)
+                if code is None:
+                    from surfacechem.solve.radau.work import PARTS
 
-    def _compiled(self) -> Any:
-        from surfacechem.solve.radau.work import PARTS
-
-        kernel = compile_kernel(getattr(import_module(self._module), self._function), _signature(), self.folder, PARTS)
-        if not self._brief:
-            # Call with an empty batch: Numba's first dispatch takes longer than a brief run.
-            nothing = (np.zeros((EDGE_WORDS,) * axes, dtype) if axes else dtype(0) for dtype, axes in BATCH.values())
-            kernel(0, 0, np.zeros(0, np.int64), tuple(nothing))
-        objectcode.keep(kernel, self.folder)
-        return kernel
-
-
-def _signature() -> Any:
-    """Argument types of a compiled loop: the first run, the end of the range, memory, and the batch."""
-    from numba import from_dtype, types
-
-    numba_types: Any = types
-    entries = [(from_dtype(np.dtype(dtype)), axes) for dtype, axes in BATCH.values()]
-    batch = numba_types.Tuple([types.Array(entry, axes, "C") if axes else entry for entry, axes in entries])
-    return types.void(types.int64, types.int64, types.int64[::1], batch)
+                    code = compile_kernel(getattr(import_module(self._module), self._function), PARTS)
+                    store_code(self.folder, code)
+                self._kernel = Kernel(code)
+            return self._kernel
 
 
 LOOP = Loop(sources(), "surfacechem.solve.radau.driver", "run_batch")
@@ -317,7 +302,7 @@ LOOP = Loop(sources(), "surfacechem.solve.radau.driver", "run_batch")
 def repeated(batch: Any) -> Callable[[], None]:
     """Return a function that runs a batch at each call in the same memory, with the present contents of its rows."""
     memory = np.zeros(_words_of(tuple(batch.sizes.tolist())), np.int64)
-    return partial(LOOP.load(), 0, len(batch.ends), memory, tuple(batch))
+    return partial(LOOP.load(), len(batch.ends), (*batch, memory))
 
 
 def run(batch: Any) -> None:

@@ -28,7 +28,8 @@ from numba.extending import (
     register_model,
 )
 
-from surfacechem.solve.radau.stepper import BATCH, EDGE_TABLES, EDGE_WORDS, MEMORY, NUMBERS, SIZES, WIDTH
+from surfacechem.compile.objectcode import DATA, SHAPE
+from surfacechem.solve.radau.stepper import BATCH, EDGE_TABLES, EDGE_WORDS, MEMORY, NUMBERS, SETTINGS, SIZES, WIDTH
 
 # -- the record of a trajectory ---------------------------------------------------------------------------------------
 
@@ -61,9 +62,9 @@ def _layout(
     place = 0
     for name, (dtype, axes) in {**EDGE_TABLES, **BATCH}.items():
         entry = _NUMBA.get(dtype) or numba.from_dtype(np.dtype(dtype))
-        fields[name] = _Field(types.Array(entry, axes, "C") if axes else entry, None, place)
+        fields[name] = _Field(types.Array(entry, axes, "C"), None, place)
         place += 1 + axes
-    for name, kind in {**dict.fromkeys(sizes, int), **numbers}.items():
+    for name, kind in {**dict.fromkeys(sizes, int), **dict.fromkeys(SETTINGS, float), **numbers}.items():
         fields[name] = _Field(_NUMBA[kind], None, place)
         place += 1
     for name, (kind, shape) in memory.items():
@@ -113,8 +114,8 @@ def _word(builder: Any, work: Any, place: int, kind: Any) -> Any:
 
 
 def _fixed(builder: Any, work: Any, place: int, kind: Any) -> Any:
-    """Load a word that never changes: an address, a size, a scalar of the batch. The metadata lets the compiler keep it
-    in a register instead of loading it again after each store.
+    """Load a word that never changes: an address, a size, a setting. The metadata lets the compiler keep it in a
+    register instead of loading it again after each store.
     """
     value = builder.load(_word(builder, work, place, kind))
     value.set_metadata("invariant.load", builder.module.add_metadata([]))
@@ -164,37 +165,40 @@ def _store_field(_context: Any, builder: Any, signature: Any, args: Any, name: s
 
 def laying_out(record: StepperRecord) -> Any:
     """Return a function that makes the record of a batch on its caller's stack: its inputs, and the addresses of its
-    work arrays, contiguous in a memory.
+    work arrays, contiguous in a memory. Its argument is the address of a table of the arrays of the batch and, last, of
+    the memory.
     """
     fields = record.fields
+    # Arrays whose entries are words of the record, and where they are.
+    copied = {
+        "edge_words": (0, EDGE_WORDS),
+        "sizes": (fields[record.sizes[0]].place, len(record.sizes)),
+        "settings": (fields[SETTINGS[0]].place, len(SETTINGS)),
+    }
 
     @_intrinsic
-    def lay_out(_context: Any, batch: Any, memory: Any) -> Any:
+    def lay_out(_context: Any, _table: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
             work = builder.bitcast(_alloca(builder, ir.ArrayType(_WORD, record.words)), _POINTER)
 
             def store(place: int, value: Any) -> None:
                 builder.store(value, _word(builder, work, place, value.type))
 
-            for k, (name, kind) in enumerate(zip(BATCH, batch.types, strict=True)):
-                place, value = fields[name].place, builder.extract_value(args[0], k)
-                if isinstance(kind, types.Array):
-                    given = context.make_array(kind)(context, builder, value)
-                    store(place, given.data)
-                    for axis in range(kind.ndim):
-                        store(place + 1 + axis, builder.extract_value(given.shape, axis))
-                    if name == "edge_words":
-                        for word in range(EDGE_WORDS):
-                            store(word, builder.load(builder.gep(given.data, [_WORD(word)])))
-                    if name == "sizes":
-                        for j, size in enumerate(record.sizes):
-                            entry = builder.gep(given.data, [_WORD(j)])
-                            store(fields[size].place, builder.load(entry))
-                else:
-                    store(place, value)
+            def word(start: Any, offset: int) -> Any:
+                """Return the word at an offset in bytes from an address."""
+                return builder.load(builder.inttoptr(builder.add(start, _WORD(offset)), _WORD.as_pointer()))
+
+            for k, (name, (_, axes)) in enumerate(BATCH.items()):
+                place, array = fields[name].place, word(args[0], 8 * k)
+                data, shape = word(array, DATA), word(array, SHAPE)
+                for j, value in enumerate([data, *(word(shape, 8 * axis) for axis in range(axes))]):
+                    store(place + j, value)
+                start, count = copied.get(name, (0, 0))
+                for j in range(count):
+                    store(start + j, word(data, 8 * j))
             for name, kind in record.numbers.items():
                 store(fields[name].place, _Constant(context.get_value_type(_NUMBA[kind]), 0))
-            free = builder.ptrtoint(context.make_array(memory)(context, builder, args[1]).data, _WORD)
+            free = word(word(args[0], 8 * len(BATCH)), DATA)
             for name, (kind, shape) in record.memory.items():
                 store(fields[name].place, free)
                 size = _WORD(np.dtype(kind).itemsize)
@@ -209,7 +213,7 @@ def laying_out(record: StepperRecord) -> Any:
             opaque = ir.FunctionType(_POINTER, [_POINTER])
             return builder.asm(opaque, "", "=r,0,~{memory}", [work], True)
 
-        return record(batch, memory), generate
+        return record(types.int64), generate
 
     return lay_out
 
