@@ -1,7 +1,6 @@
 """Machine code from expressions."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,25 +8,9 @@ import symengine as se
 
 import surfacechem
 from surfacechem.compile import program
-from surfacechem.compile.program import compile_function, compile_program, expanded, jacobian
+from surfacechem.compile.program import compile_function, compile_program
 from surfacechem.solve.radau.stepper import LOOP
 from surfacechem.solve.run import Model
-
-
-def test_derivatives_and_layout() -> None:
-    t, x, z, dx, dz, k = se.symbols("t x z dx dz k")
-    program = compile_program(
-        t, [x, z], [dx, dz], [k], [x * dx + k * z, z**2 - t * x], ledger=[k * dx], margins=[x - 1]
-    )
-    inputs = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0]
-    assert program.n_inputs == 6
-    assert program.algebraic == (False, True)
-    np.testing.assert_array_equal(program.residual(inputs), [21.0 + 65.0, 25.0 - 6.0])
-    np.testing.assert_array_equal(program.jacobian(inputs), [7.0, 13.0, -2.0, 10.0, 3.0, 0.0, 0.0, 0.0])
-    assert program.ledger is not None
-    assert program.margins is not None
-    assert program.ledger([inputs, inputs]).shape == (2, 1)
-    np.testing.assert_array_equal(program.margins(inputs), [2.0])
 
 
 def test_machine_code_is_loaded_where_it_is_of_the_same_expressions(tmp_path, monkeypatch) -> None:
@@ -133,52 +116,10 @@ def test_a_system_with_less_in_it_is_another_one() -> None:
     assert bare.output_function.n_out == whole.output_function.n_out - system.named[-1].output
 
 
-def test_unused_inputs_and_constants() -> None:
-    x, y = se.symbols("x y")
-    function = compile_function([x, y], [x, 3])
-    np.testing.assert_array_equal(function([1.0, np.nan]), [1.0, 3.0])
-    assert function(np.empty((0, 2))).shape == (0, 2)
-
-
-def test_one_row_gives_the_bits_that_it_gives_among_others() -> None:
-    x, y = se.symbols("x y")
-    function = compile_function([x, y], [se.sin(x) ** 3.3, x / y])
-    rows = np.random.default_rng(0).uniform(0.1, 1.0, (5, 2))
-    together = function(rows)
-    for row in (rows[2], rows[2].tolist()):
-        np.testing.assert_array_equal(function(row), together[2])
-    with pytest.raises(ValueError, match="size mismatch"):
-        function(rows[2, :1])
-
-
 def test_counts_must_agree() -> None:
     t, x, dx = se.symbols("t x dx")
     with pytest.raises(ValueError, match="as many equations as states"):
         compile_program(t, [x], [dx], [], [dx, x])
-
-
-def test_what_is_named_is_differentiated_once() -> None:
-    """Each name stands twice in the next: written out, the equation has 2^60 terms."""
-    t, x, dx = se.symbols("t x dx")
-    names = se.symbols("r:61")
-    named = [(names[0], x), *((after, 1 + before / (1 + before)) for before, after in pairwise(names))]
-    program = compile_program(t, [x], [dx], [], [dx - names[-1]], named=named)
-    value, slope = 0.9, 1.0
-    for _ in names[1:]:
-        value, slope = 1 + value / (1 + value), slope / (1 + value) ** 2
-    np.testing.assert_allclose(program.jacobian([0.0, 0.9, 0.0]), [-slope, 1.0], rtol=1e-12)
-
-
-def test_derivatives_are_those_of_the_written_out_equations() -> None:
-    x, y, r, q, unused = se.symbols("x y r q unused")
-    named = [(r, se.exp(-x) * y**1.5), (q, se.Piecewise((se.log(x) * r, x > 1), (r / y, True))), (unused, q**x)]
-    rows = [q * se.tanh(r) + x, y**x - q, se.Piecewise((q, y > r), (0, True))]
-    slopes, names = jacobian(rows, [x, y], named)
-    entries = expanded(names, [row.get(over, 0) for row in slopes for over in (x, y)])
-    exact = [se.diff(row, over) for row in expanded(named, rows) for over in (x, y)]
-    for point in ([0.5, 2.0], [1.5, 0.3]):
-        expected = compile_function([x, y], exact)(point)
-        np.testing.assert_allclose(compile_function([x, y], entries)(point), expected, rtol=1e-13)
 
 
 @pytest.mark.parametrize("cells", [4, 40])

@@ -1,9 +1,5 @@
 """Machine code for eight cases at once: right to the last place, at every end of the range, for every case there is."""
 
-import time
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
-
 import case_runs
 import mpmath
 import numpy as np
@@ -124,20 +120,3 @@ def test_rates_and_guards_of_a_case_are_those_of_its_scalar_code(member):
     if program.margins is not None:
         guards = program.margins(rows).T
         assert program.lanes.margins(inputs) == pytest.approx(guards, rel=1e-9, abs=1e-12 * np.abs(guards).max())
-
-
-@pytest.mark.parametrize(("code", "maker"), [("lanes", "laned"), ("implicit_lanes", "laned"), ("rates", "solved")])
-def test_threads_share_the_code_of_a_program(code, maker):
-    """Tables hold its address: machine code that another thread has made anew would leave them without any."""
-    model = case_runs.load("exothermic").model
-    made = []
-
-    def slowly(*how):
-        made.append(time.sleep(0.05))
-        return getattr(model.program, maker)(*how)
-
-    program = replace(model.program, **{maker: slowly})
-    with ThreadPoolExecutor(2) as pool:
-        first, second = pool.map(lambda _: getattr(program, code), range(2))
-    assert first is second
-    assert len(made) == 1

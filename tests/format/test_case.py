@@ -1,19 +1,10 @@
 """A case file becomes a scene, a run and a reference."""
 
-import numpy as np
 import pytest
 
-from surfacechem.contracts.terms import Varying
-from surfacechem.documents import cases, document, mechanisms
+from surfacechem.documents import document, mechanisms
 from surfacechem.errors import InputError
 from surfacechem.format import load, load_text
-from surfacechem.laws.factors import Linear, Power
-from surfacechem.laws.free_energy import BondEnergy
-from surfacechem.laws.friction import Coulomb
-from surfacechem.laws.kinetics import LinearAffinity
-from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
-from surfacechem.scene import Sites
-from surfacechem.solve.run import Run
 
 TEXT = """\
 title: Everything
@@ -58,87 +49,11 @@ def everything():
     return load_text(TEXT, "everything")
 
 
-def test_scene(everything):
-    scene, interface = everything.scene, everything.scene.interface
-    lower, upper = scene.bodies
-    assert (lower.name, lower.temperature, lower.energy.name(), lower.energy.C) == ("lower", "T_1", "quadratic", 1e3)
-    assert (upper.name, upper.temperature, upper.energy.name(), upper.energy.C) == ("upper", "T_2", "constant", 2e3)
-    assert (interface.temperature, interface.sites) == ("T_c", Sites(2e18, 1e18, 2))
-    assert [(type(law), law.place.path, law.place.line) for law in interface.potentials[::2]] == [
-        (BondEnergy, "interface.potential.bond-energy", 10),
-        (BondEnergy, "interface.potential.bond-energy[2]", 12),
-    ]
-    (bonding,) = interface.reactions
-    assert (type(bonding), bonding.c_r) == (LinearAffinity, 3.3e12)
-    assert [(law.between, law.h) for law in scene.heat][::2] == [
-        (("lower", "interface"), 2500.0),
-        (("upper", "surroundings"), 12.0),
-    ]
-    assert scene.initial == {"phi": 0.1, "T_1": 300.0, "T_2": 310.0, "T_c": 300.0}
-    assert scene.T_0 == 300.0
-
-
-def test_a_parameter_that_varies(everything):
-    (friction,) = everything.scene.interface.frictions
-    assert isinstance(friction, Coulomb)
-    assert isinstance(friction.mu, Varying)
-    power, linear = friction.mu.factors
-    assert (friction.mu.value, type(power), power.of, power.exponent) == (0.3, Power, "T_c", -1.0)
-    assert (type(linear), linear.of, linear.slope, linear.about) == (Linear, "v", pytest.approx(100.0), 0.01)
-    assert (linear.place.path, linear.place.line) == ("interface.friction.coulomb.mu.times.linear", 19)
-
-
-def test_loading(everything):
-    loads = everything.scene.loading
-    kinds = [type(load) for load in (everything.scene.surroundings, *loads.values())]
-    assert kinds == [Hold, Hold, Ramp, Harmonic, Table]
-    assert everything.scene.surroundings.level == 298.15
-    assert (loads["v"].level, loads["v"].path) == (0.02, "loading.v")
-    assert (loads["p"].start, loads["p"].rate, loads["p"].path) == (0.0, 1e3, "loading.p.ramp")
-    assert loads["Q_1"].phase == pytest.approx(np.pi / 2, rel=1e-15)
-    assert (loads["Q_2"].times, loads["Q_2"].values) == ((0.0, 60.0), (1.0, 2000.0))
-
-
-def test_run(everything):
-    run = everything.run
-    assert run.times == tuple(np.linspace(0, 5, 11))
-    assert (run.accuracy, run.rtol, run.atol, run.solver) == (1e-8, 1e-10, None, "radau")
-    assert (run.max_steps, run.max_seconds) == (1000, 60.0)
-
-
 def test_it_assembles_and_every_parameter_path_can_be_overridden(everything):
     settable = (p for p in everything.system().parameters if not p.internal and not (p.load and p.field))
     values = {p.path: 0.99 * (p.value or 0.01) for p in settable if p.path != "phi_max"}
     changed = {p.path: p.value for p in load_text(TEXT, overrides=values).system().parameters}
     assert {path: changed[path] for path in values} == values
-
-
-def run_of(section):
-    return load("endothermic", {"run": section}).run
-
-
-def test_logarithmic_times():
-    times = run_of({"until": "1 s", "outputs": 5, "spacing": "logarithmic", "first": "1 ms"}).times
-    assert times == pytest.approx((0.0, 1e-3, 1e-2, 1e-1, 1.0))
-    assert times[-1] == 1.0
-
-
-@pytest.mark.parametrize("times", [["0 s", "1 ms", 2], ["1 ms", 2]])
-def test_listed_times(times):
-    assert run_of({"times": times}).times == (0.0, 1e-3, 2.0)
-
-
-@pytest.mark.parametrize(
-    ("section", "rtol"),
-    [({}, Run.rtol), ({"accuracy": 1e-20}, 1e-13), ({"accuracy": 1}, 1e-3), ({"rtol": 1e-5}, 1e-5)],
-)
-def test_tolerance(section, rtol):
-    assert run_of({"until": 1, **section}).rtol == pytest.approx(rtol)
-
-
-def test_reference_with_parameters():
-    given = load("sliding-dry", {"reference": {"name": "sliding", "D": "1 kW/m^2"}}).reference
-    assert (given.name, given.options) == ("sliding", {"D": 1000.0})
 
 
 def test_a_number_for_a_parameter_that_varies_keeps_its_factors():
@@ -162,23 +77,6 @@ def test_overrides_come_in_order_and_make_what_is_missing():
     changed = load("cooling-to-zero", ["run.until=1 s", "run.until=2 s", "interface.partition=0.25", "run.outputs=3"])
     assert changed.run.times == (0.0, 1.0, 2.0)
     assert changed.scene.interface.partition == 0.25
-
-
-@pytest.mark.parametrize("overrides", [[], ["run.until=1.25 s", "bodies.lower.C=3 J/m^2/K"]])
-def test_a_case_can_be_read_again_from_its_text(overrides):
-    first = load("endothermic", overrides)
-    again = load_text(first.text, first.name)
-    assert (again.text, again.run) == (first.text, first.run)
-    assert [str(p) for p in again.system().parameters] == [str(p) for p in first.system().parameters]
-    if not overrides:
-        assert first.text == (cases() / "endothermic.yaml").read_text(encoding="utf-8")
-
-
-def test_a_mechanism_is_read_again_from_its_text(tmp_path):
-    with_mechanism = load("dna-adhesive")
-    again = load_text(with_mechanism.text, base=tmp_path, mechanism_text=with_mechanism.mechanism_text)
-    assert again.scene.interface.variables == with_mechanism.scene.interface.variables
-    assert again.scene.initial == with_mechanism.scene.initial
 
 
 def test_a_mechanism_beside_the_case_comes_first(tmp_path):

@@ -1,7 +1,6 @@
 """Media: fits against CoolProp, runs that leave their range, what is refused, and nothing imported without need."""
 
 import dataclasses
-import math
 
 import numpy as np
 import pytest
@@ -12,15 +11,12 @@ from surfacechem import format as case
 from surfacechem.contracts import fits
 from surfacechem.errors import InputError
 from surfacechem.laws.coolprop import PROPERTIES, CoolPropFluid
-from surfacechem.laws.films import Film, FilmCapacity, FilmShear, FilmWear, RarefiedFilm, Roelands, Vogel
+from surfacechem.laws.films import Film, FilmCapacity, FilmShear, FilmWear, Roelands, Vogel
 from surfacechem.laws.free_energy import Constant, ConstantInterfaceCapacity
 from surfacechem.laws.friction import Viscous
 from surfacechem.laws.loading import Hold
 from surfacechem.model.assemble import assemble
-from surfacechem.quantities import BOLTZMANN
-from surfacechem.results.audit import audit
 from surfacechem.results.error_estimates import computed
-from surfacechem.results.solution import Solution
 from surfacechem.runs import simulation
 from surfacechem.scene import Body, Interface, Medium, Scene
 from surfacechem.solve.run import Model, Run
@@ -148,24 +144,6 @@ def test_properties_in_the_compiled_code(name):
     assert values["t_film_shear"] == pytest.approx(values["eta_m"] * values["v"] / 2e-6, rel=1e-12)
 
 
-@pytest.mark.parametrize(("T_start", "reached"), [(300.0, ()), (500.0, (200.0, 700.0))])
-def test_energy_and_entropy_of_a_film_are_the_integrals_of_its_heat_capacity(T_start, reached):
-    """Also in the last of many pieces, into which the fit over a wide range is divided."""
-    film = medium("Nitrogen", reached=reached)
-    values = computed(solved(lubricated(film, v=40.0, T=T_start), *np.linspace(0.0, 2.0, 21)))
-    fluid, d = CoolPropFluid("Nitrogen", 1e5), 2e-6
-    nodes, weights = np.polynomial.legendre.leggauss(40)
-    start = values["T_c"][0]
-    energy, entropy = (values[name] - values[name][0] for name in ("U_c", "S_c"))
-    for T, U, S in zip(values["T_c"][1:], energy[1:], entropy[1:], strict=True):
-        points = start + (T - start) * (nodes + 1) / 2
-        over_T = d * fluid.values("capacity_m", points)
-        assert pytest.approx((T - start) / 2 * weights @ over_T, rel=BOUND) == S
-        assert pytest.approx((T - start) / 2 * weights @ (over_T * points), rel=BOUND) == U
-    if not reached:
-        assert (values["U_c"][0], values["S_c"][0]) == pytest.approx((0.0, 0.0), abs=1e-12)
-
-
 # -- heat made across a film ------------------------------------------------------------------------------------------
 
 K_M, ETA, D_M = 0.13, 0.01, 5e-6
@@ -200,40 +178,10 @@ def test_a_sheared_film_against_couette_flow(T_1, T_2, v):
     assert values["T_c"] == pytest.approx(np.trapezoid(T, profile), rel=1e-8)
 
 
-def test_heat_made_across_a_gas_passes_the_jump_at_each_wall():
-    T_1, T_2, d = 300.0, 320.0, 1e-7
-    given = {"alpha_1": 0.9, "alpha_2": 0.2}
-    scene = between_walls(T_1, T_2, 200.0, law=RarefiedFilm, given={}, **given)
-    within = dataclasses.replace(scene.interface, medium=medium("Nitrogen", 1e5, d))
-    values = steady(dataclasses.replace(scene, interface=within))
-    fluid, T_c = CoolPropFluid("Nitrogen", 1e5), values["T_c"]
-    gas = {name: float(fluid.values(name, np.array([T_c]))[0]) for name in ("k_m", "eta_m", "rho_m", "cp_m", "gamma_m")}
-    law = RarefiedFilm(between=("lower", "upper"), **given)
-    r_1, r, r_2 = law.resistances(**gas, p_m=1e5, d_m=d)
-    # T = level + slope y - heat r y^2 / 2 across the film; at each wall the flux passes the resistance of the jump.
-    heat = gas["eta_m"] * 200.0**2 / d
-    jumps = [[1.0, -r_1 / r], [1.0, 1.0 + r_2 / r]]
-    level, slope = np.linalg.solve(jumps, [T_1, T_2 + heat * (r / 2 + r_2)])
-    assert T_c == pytest.approx(level + slope / 2 - heat * r / 6, rel=1e-8)
-    assert values["q_1"] == pytest.approx(slope / r, rel=1e-6)
-    assert values["q_2"] == pytest.approx(heat - slope / r, rel=1e-6)
-
-
 @pytest.mark.parametrize("T_c", [250.0, 345.0, 700.0])
 def test_a_film_produces_entropy_whatever_its_temperature(T_c):
     scene = dataclasses.replace(between_walls(250.0, 450.0, 0.0), initial={"T_c": T_c})
     assert np.all(computed(solved(scene, 0.0, 1e-6, 1e-4, 1e-2))["sigma_film"] > 0)
-
-
-def test_a_film_on_one_wall_in_perfect_contact():
-    """With the mean temperature of the film at that of one wall the profile reaches the other by 4 k/d."""
-    scene = between_walls(300.0, 310.0, 10.0)
-    pair = Body("lower", "T_1", Constant(C=1e3)), scene.bodies[1]
-    interface = dataclasses.replace(scene.interface, temperature="T_1")
-    joined = dataclasses.replace(scene, bodies=pair, interface=interface, initial={"T_1": 300.0})
-    values = computed(solved(joined, 0.0, 0.1))
-    assert values["q_2"] == pytest.approx(4 * K_M / D_M * (values["T_1"] - 310.0), rel=1e-9)
-    assert audit(solved(joined, 0.0, 0.1)).energy_error < 1e-9
 
 
 # -- how far a run may go ----------------------------------------------------------------------------------------------
@@ -269,25 +217,6 @@ def test_properties_end_where_the_fluid_freezes(fluid, p, T, low):
         assert off(found, quantity, np.linspace(span.low, T, 7), span.low, min(2 * T, span.high)) < BOUND
 
 
-def test_a_film_of_thin_vapour():
-    """Below the triple pressure, at rest between walls of two temperatures."""
-    found = case.load_text(
-        """
-bodies: {lower: {temperature: T_1, C: 500 J/m^2/K}, upper: {temperature: T_2, C: 500 J/m^2/K}}
-T_0: 300
-interface: {temperature: T_c, medium: {fluid: Water, pressure: 100 Pa, thickness: 10 um}, friction: [film-shear]}
-heat: [film: {between: [lower, upper], closure: medium}]
-loading: {v: 1 mm/s}
-initial: {T_1: 300, T_2: 301}
-run: {until: 1}
-"""
-    )
-    values = computed(Model(assemble(found.scene)).solve(Run(times=[0.0, 1e-3])))
-    assert values["eta_m"][0] == pytest.approx(
-        CoolPropFluid("Water", 100.0).values("eta_m", values["T_c"])[0], rel=BOUND
-    )
-
-
 def test_an_algebraic_temperature_far_from_its_guess_is_found():
     scene = lubricated(medium("Nitrogen", thickness=5e-4), v=870.0, capacity=False)
     trajectory = solved(scene, 0.0, 1.0)
@@ -298,24 +227,10 @@ def test_an_algebraic_temperature_far_from_its_guess_is_found():
         assert values[quantity] == pytest.approx(exact.values(quantity, values["T_c"]), rel=BOUND)
 
 
-def test_a_start_elsewhere_has_the_properties_there():
-    model = Model(assemble(lubricated(medium("Nitrogen"))))
-    changes = {f"initial.{name}": 500.0 for name in ("T_1", "T_2", "T_c")}
-    values = computed(model.solve(Run(times=[0.0, 0.1]), changes))
-    assert values["eta_m"][0] == pytest.approx(CoolPropFluid("Nitrogen", 1e5).values("eta_m", np.array([500.0]))[0])
-
-
 def test_a_liquid_that_boils_ends_the_run():
     trajectory = solved(lubricated(medium(), v=20.0), 0.0, 1.0, 5.0)
     assert trajectory.status == "stopped"
     assert trajectory.reason.startswith("Water at 100000 Pa boils at T_c = 372.752 K")
-
-
-@pytest.mark.parametrize(("T_1", "told"), [(360.0, False), (400.0, True)])
-def test_a_liquid_that_boils_at_one_wall_is_told(T_1, told):
-    trajectory = solved(lubricated(medium(), v=0.0), 0.0, 1e-3, **{"initial.T_1": T_1})
-    expected = "Water at 100000 Pa boils at the wall of lower, while the film keeps the properties that it has at T_c."
-    assert (expected in Solution(trajectory).warnings) == told
 
 
 # -- what is refused --------------------------------------------------------------------------------------------------
@@ -448,24 +363,3 @@ def test_what_is_not_smooth_everywhere_is_fitted_around_the_start():
     trajectory = solved(lubricated(medium("Methane", p=101325.0, thickness=5e-5), v=800.0), *np.linspace(0.0, 50.0, 3))
     assert trajectory.status == "stopped"
     assert "the properties of Methane are fitted no further (give `interface.medium.temperatures`" in trajectory.reason
-
-
-GROWING = """
-bodies: {lower: {temperature: 350}, upper: {temperature: 350}}
-interface:
-  temperature: 350
-  medium: {growth: [%s: {G_0: 0.1, E: 0.8 eV, V: 0.02 nm^3}, film-wear: {L: 2}]}
-  friction: [coulomb: {mu: 0.5}]
-loading: {p: 2 GPa, v: -0.1}
-initial: {d_m: 1 nm}
-run: {until: 50}
-"""
-
-
-@pytest.mark.parametrize(("law", "stress"), [("pressure-activated-growth", 2e9), ("shear-activated-growth", 1e9)])
-def test_a_film_grows_to_where_it_wears_as_fast(law, stress):
-    """The exact solution of h' = G - |v| h / L."""
-    solution = simulation.Simulation(case.load_text(GROWING % law)).run()
-    growth, pace = 0.1 * math.exp((2e-29 * stress - 0.8 * 1.602176634e-19) / (BOLTZMANN * 350)), 0.1 / 2
-    t, final = solution.dataset["time"].values, growth / pace
-    np.testing.assert_allclose(solution.dataset["d_m"], final + (1e-9 - final) * np.exp(-pace * t), rtol=1e-9)

@@ -8,12 +8,10 @@ import pytest
 import symengine
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sampling import every
 from scenes import bodies, path
-from scipy.linalg import expm
 
 import surfacechem
-from mechanisms import KMOL, SHIPPED, load, loading_read, loads, mechanism_texts, pulled, states
+from mechanisms import KMOL, mechanism_texts, pulled, states
 from surfacechem.documents import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.laws.free_energy import Constant, ConstantInterfaceCapacity
@@ -23,9 +21,6 @@ from surfacechem.mechanism.thermo import IdealMixture
 from surfacechem.model.assemble import assemble
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Interface, Scene
-
-UNDER = {"gap": 2e-9, "force": 10e-12}
-"""A load that single bonds bear."""
 
 
 def scene(mechanism, initial, capacity=None, T_c=None, stretch=None, loading=None):
@@ -46,16 +41,6 @@ def scene(mechanism, initial, capacity=None, T_c=None, stretch=None, loading=Non
         T_0=298.15,
         initial={"T_1": 298.15, "T_2": 310.0, "T_c": 302.0, **initial},
     )
-
-
-def shipped(name, gap=UNDER["gap"], force=UNDER["force"], law=lambda level: Hold(level=level), **rest):
-    """A mechanism whose last species is its bond, at a load that a law prescribes where the mechanism reads it."""
-    names = list(load(name).species)
-    mechanism = load(name, names[-1:])
-    start = {species: (i + 1) / sum(range(len(names) + 1)) for i, species in enumerate(reversed(names))}
-    levels = {"g_n": gap, "f": force}
-    loading = {read: law(levels[read]) for read in loading_read(mechanism)}
-    return mechanism, scene(mechanism, mechanism.coverages(start), loading=loading, **rest)
 
 
 def numbers(system, expressions, point):
@@ -94,16 +79,6 @@ def heat_row(system, names):
     return row - row.subs({symengine.Symbol(f"d{name}_dt"): 0 for name in names})
 
 
-@pytest.mark.parametrize("name", every(3, SHIPPED))
-@given(data=st.data(), under=loads, more=st.sampled_from([(None, 1.0), (42.0, 1.25)]))
-@settings(max_examples=4)
-def test_shipped_mechanisms_in_a_scene(name, data, under, more):
-    """Also on a stretched surface, where all densities are the current ones."""
-    capacity, stretch = more
-    mechanism, built = shipped(name, capacity=capacity, stretch=stretch, **under)
-    compare(mechanism, assemble(built), *data.draw(states(len(mechanism.variables))), stretch=stretch, **under)
-
-
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     return tmp_path_factory.mktemp("mechanisms") / "random.yaml"
@@ -118,17 +93,6 @@ def test_random_mechanisms_in_a_scene(file, data):
     T, coverages = data.draw(states(len(mechanism.variables)))
     initial = {variable.name: theta for variable, theta in zip(mechanism.variables, coverages, strict=True)}
     compare(mechanism, assemble(scene(mechanism, initial, capacity=1e6)), T, coverages)
-
-
-def test_phi_counts_bonds_and_is_in_the_dataset():
-    mechanism, built = shipped("dna-film.yaml")
-    system = assemble(built)
-    phi = system.find("phi")
-    assert phi.output
-    assert numbers(system, [phi.expression], {"theta_AB_s": 0.4}) == pytest.approx([0.4])
-    (law,) = mechanism.reactions
-    assert {p.path for p in system.parameters} >= {"interface.mechanism.reactions.R1.A", "interface.sites"}
-    assert next(p for p in system.parameters if p.path == f"{law.path}.A").spec.unit == "m^2/s"
 
 
 FILM = """
@@ -199,58 +163,3 @@ def test_what_cantera_warns_of_is_a_warning_of_the_run(tmp_path):
     mechanism = load_mechanism(tmp_path / "broken.yaml")
     assert len(mechanism.remarks) == 3
     assert all("broken.yaml: Cantera: NasaPoly2::validate: For species" in remark for remark in mechanism.remarks)
-
-
-CASE = """
-bodies:
-  lower: {{temperature: T, C: 1 kJ/m^2/K, capacity: constant}}
-  upper: {{temperature: T, C: 1 kJ/m^2/K, capacity: constant}}
-interface: {{temperature: T, mechanism: {{file: {file}, bonds: [{bond}]}}}}
-T_0: 300 K
-initial: {{T: 300 K, coverages: {coverages}}}
-run: {{until: 10 s, rtol: 1e-9}}
-"""
-STARTS = [
-    ("dna-tethers.yaml", "bond(s)", "{free(s): 1}"),
-    ("dna-tethers.yaml", "bond(s)", "{bond(s): 1}"),
-    ("dna-film.yaml", "AB(s)", "{AB(s): 1}"),
-    ("dna-film.yaml", "AB(s)", "{A(s): 0.5, B(s): 0.5}"),
-    ("selectin.yaml", "PL(s)", "{PL(s): 1}"),
-    ("selectin.yaml", "PL(s)", "{P(s): 0.5, L(s): 0.5}"),
-]
-
-
-@pytest.mark.parametrize(("file", "bond", "coverages"), STARTS)
-def test_the_books_close_from_empty_and_full_coverages(file, bond, coverages):
-    """Chemical potentials are infinite there, the books are not."""
-    books = surfacechem.load(CASE.format(file=file, bond=bond, coverages=coverages)).run(error="balances").audit
-    assert books.entropy_error < 1e-7
-    assert books.energy_error < 1e-7
-    assert books.violations == ()
-
-
-def test_forty_species_follow_the_exponential_of_their_matrix(tmp_path):
-    # From thirty variables on the stepper exchanges columns and passes over zeros.
-    n, draw = 40, np.random.default_rng(3)
-    pairs = [(i, (i + 1) % n) for i in range(n)] + [(i, (i + draw.integers(2, n)) % n) for i in range(n)]
-    rates = 10 ** draw.uniform(-2, 4, len(pairs))
-    entries = [
-        f"- {{equation: A{i} => A{j}, rate-constant: {{A: {k:.17g}, b: 0, Ea: 0}}}}"
-        for (i, j), k in zip(pairs, rates, strict=True)
-    ]
-    species = [f"- {{name: A{i}, composition: {{H: 1}}, thermo: {{model: constant-cp}}}}" for i in range(n)]
-    names = ", ".join(f"A{i}" for i in range(n))
-    phase = f"- {{name: s, thermo: ideal-surface, site-density: 1e-5 mol/m^2, kinetics: surface, species: [{names}]}}"
-    text = ["phases:", phase, "species:", *species, "reactions:", *entries]
-    (tmp_path / "many.yaml").write_text("\n".join(text))
-    (tmp_path / "case.yaml").write_text(
-        "bodies: {a: {temperature: 300 K}, b: {temperature: 300 K}}\n"
-        "interface: {temperature: 300 K, mechanism: {file: many.yaml}}\n"
-        "initial: {coverages: {A0: 1}}\nrun: {until: 0.1 s, outputs: 2, rtol: 1e-10}\n"
-    )
-    matrix = np.zeros((n, n))
-    for (i, j), k in zip(pairs, rates, strict=True):
-        matrix[i, i] -= k
-        matrix[j, i] += k
-    end = surfacechem.load(tmp_path / "case.yaml").run(error="balances").trajectory.result.y
-    np.testing.assert_allclose(end[:n], expm(0.1 * matrix)[:, 0], rtol=1e-9, atol=1e-14)

@@ -10,12 +10,9 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 from sampling import every
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
 from test_mechanism_cantera import FOLDER, SURFACES
 
 import surfacechem
-from surfacechem.documents import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.laws.loading import Hold
 from surfacechem.mechanism.thermo import word
@@ -96,9 +93,6 @@ interface:
 initial: {{coverages: {coverages}}}
 run: {{until: {until}, outputs: 6, solver: cantera, rtol: {rtol}}}
 """
-ADIABATIC = ISOTHERMAL.replace("initial: {{", "initial: {{T: {T} K, ").replace("temperature: {T} K", "temperature: T")
-ADIABATIC = ADIABATIC.replace("lower: {{", "lower: {{C: 1 J/m^2/K, capacity: constant, ")
-ADIABATIC = ADIABATIC.replace("upper: {{", "upper: {{C: 0.5 J/m^2/K, capacity: constant, ")
 
 
 def written(folder: Path, surface: tuple[str, str], text: str = ISOTHERMAL, **changes: object) -> Path:
@@ -179,31 +173,6 @@ def test_at_constant_temperature_as_in_cantera(which, tmp_path):
     assert solution.audit.energy_error < BOOKS
     assert solution.audit.entropy_error < BOOKS
     assert solution.audit.site_error < BOOKS
-
-
-def test_heat_of_reaction_warms_the_bodies(tmp_path):
-    """The energy balance of bodies and surface, integrated with Cantera's own enthalpies."""
-    which = "sofc.yaml", "metal_surface"
-    solution = surfacechem.load(written(tmp_path, which, ADIABATIC, until=1e-4)).run(error="balances")
-    data, surface = solution.dataset, alone(which)
-    start = np.append(surface.coverages, CASES[which].T)
-
-    def rates(_, y):
-        surface.TP = y[-1], None
-        surface.adjacent["gas"].TP = y[-1], ct.one_atm
-        surface.set_unnormalized_coverages(y[:-1])
-        r, h, _ = reactions(surface)
-        own = surface.get_net_production_rates(surface) / surface.site_density
-        capacity = 1.5 + surface.partial_molar_cp @ (surface.coverages * surface.site_density)
-        return np.append(own, -np.sum(r * h) / capacity)
-
-    exact = solve_ivp(rates, (0, 1e-4), start, method="Radau", rtol=1e-10, atol=1e-14, t_eval=data["time"].values)
-    rise = data["T"].values - CASES[which].T
-    assert np.abs(rise).max() > 0.01
-    np.testing.assert_allclose(rise, exact.y[-1] - CASES[which].T, atol=1e-6 * np.abs(rise).max())
-    change = float(data["E_total"][-1] - data["E_total"][0])
-    assert change == pytest.approx(float(data["H_neighbours"][-1]), rel=BOOKS)
-    assert solution.audit.violations == ()
 
 
 def test_a_run_again_from_its_file(tmp_path):
@@ -336,39 +305,6 @@ def test_what_a_reversible_reaction_may_give_back_is_told(tmp_path):
     assert any("the neighbours hold no O2, which reactions make" in text for text in system.warnings)
 
 
-def test_desorption_as_the_temperature_rises_is_what_cantera_gives_point_by_point():
-    """Coverages and the rate at which the gas receives, against SciPy's integrator on Cantera's rates."""
-    data = surfacechem.load("temperature-programmed-desorption").run(error="balances").dataset
-    surface = ct.Interface(str(mechanisms() / "co-platinum.yaml"), "platinum")
-    gas = surface.adjacent["gas"]
-    gas.X = {"CO": 1e-6, "AR": 1 - 1e-6}
-    surface.coverages = "PT(S):0.4, CO(S):0.6"
-
-    def rates(t, y):
-        surface.TP = gas.TP = 430 + 10 * t, 1e-3
-        surface.set_unnormalized_coverages(y)
-        return surface.get_net_production_rates(surface) / surface.site_density
-
-    times = data["time"].values
-    exact = solve_ivp(rates, (0, times[-1]), surface.coverages, method="BDF", rtol=1e-11, atol=1e-18, t_eval=times).y
-    np.testing.assert_allclose(coverages(data, surface), exact.T, atol=3e-8, rtol=0)
-    assert np.array_equal(data["coverage"].sel(species=surface.species_names).values, coverages(data, surface))
-    desorbed = []
-    for t, y in zip(times, exact.T, strict=True):
-        rates(t, y)
-        desorbed.append(surface.get_net_production_rates(gas)[gas.species_index("CO")] * 1e3 * AVOGADRO)
-    np.testing.assert_allclose(data["production_CO"].values, desorbed, atol=1e-7 * max(desorbed), rtol=0)
-    assert times[np.argmax(desorbed)] == pytest.approx(6.6, abs=0.2)  # the peak, at 496 K
-
-
-def test_the_charge_of_a_sweep_of_the_potential_is_the_integral_of_its_current():
-    """Nothing evolves, so that the integrator takes steps of seconds in which the current changes by half."""
-    data = surfacechem.load("lithium-polarisation").run(error="balances").dataset
-    production = CubicSpline(data["time"], data["production_Li_elyt"])
-    charge = [production.integrate(0, t) for t in data["time"].values[1:]]
-    np.testing.assert_allclose(data["made_Li_elyt"][1:], charge, rtol=3e-6)
-
-
 SMALL = """
 units: {length: m, quantity: mol, activation-energy: kJ/mol}
 phases:
@@ -479,7 +415,6 @@ def test_phases_may_hold_species_of_one_name(beside, tmp_path):
 CONSTANT = "rate-constant: {A: 1e3 m^3/mol/s, b: 0, Ea: 5}"
 MASEL = "type: Blowers-Masel, rate-constant: {A: 1e3 m^3/mol/s, b: 0, Ea0: 5, w: 400}"
 STUCK = "sticking-coefficient: {A: 0.3, b: 0, Ea: 5}"
-STICKING_MASEL = "type: sticking-Blowers-Masel, sticking-coefficient: {A: 0.3, b: 0, Ea0: 5, w: 400}"
 
 
 PLACE = "small.yaml:23: reaction CO + a(s) <=> CO(s): "
@@ -513,15 +448,6 @@ LOOPS = [
 def test_what_cantera_would_evaluate_is_checked(changes, words, tmp_path):
     told = refusal(small(tmp_path, changes))
     assert all(part in told for part in (words if isinstance(words, tuple) else [words]))
-
-
-@pytest.mark.parametrize("rate", [MASEL, STICKING_MASEL])
-def test_rates_that_cantera_evaluates_are_its_own(rate, tmp_path):
-    data, rates = (
-        surfacechem.run(small(tmp_path, {CONSTANT: rate})).dataset,
-        small_alone(tmp_path).net_rates_of_progress,
-    )
-    assert float(data["R_R1"][0]) == pytest.approx(rates[0] * 1e3 * AVOGADRO, rel=1e-9)
 
 
 def test_a_temperature_out_of_the_range_of_a_gas_is_told(tmp_path):
@@ -574,14 +500,6 @@ def test_a_surface_comes_to_rest_whose_sites_drift_over_years(tmp_path):
     assert "came to rest" in solution.reason
     rest = surfacechem.steady(case, ["production_CO2"])
     assert float(solution.dataset["production_CO2"][-1]) == pytest.approx(rest.rates["production_CO2"], rel=1e-7)
-
-
-def test_a_tabulated_solution_may_lack_a_species():
-    """The table's entropy is no number there: it counts as the trace that other models make of it."""
-    composition = 'interface.mechanism.neighbours.anode={composition: {"Li[anode]": 0}, rest: "V[anode]"}'
-    solution = surfacechem.load("lithium-charging", [composition]).run(error="balances")
-    assert solution.status == "finished"
-    assert np.isfinite(solution.dataset["R_R1"]).all()
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,9 @@ from hypothesis import strategies as st
 
 from mechanisms import (
     KMOL,
-    SHIPPED,
     call,
     cantera_of,
     load,
-    loads,
     mechanism_texts,
     partial_molar,
     pulled,
@@ -88,14 +86,6 @@ def compare_thermo(mechanism, surface, point):
     assert np.all(abs(cp - surface.partial_molar_cp / 1000) <= 1e-10 * size / T)
 
 
-@pytest.mark.parametrize("name", SHIPPED)
-@given(data=st.data(), under=loads)
-@settings(max_examples=5)
-def test_shipped_mechanisms_agree_with_cantera(name, data, under):
-    mechanism = load(name)
-    compare(mechanism, *data.draw(states(len(mechanism.variables))), **under)
-
-
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     return tmp_path_factory.mktemp("mechanisms") / "random.yaml"
@@ -119,15 +109,6 @@ def test_densities_count_molecules():
     assert film.sites.phi_max == 1
     assert film.bonds == ("theta_AB_s",)
     assert film.species["AB(s)"] == "theta_AB_s"
-
-
-def test_parameters_have_paths_places_and_units():
-    (law,) = load("dna-film.yaml").reactions
-    assert law.path == "interface.mechanism.reactions.R1"
-    assert law.place.line == load("dna-film.yaml").text.splitlines().index("- equation: A(s) + B(s) <=> AB(s)") + 1
-    specs = {name: law.refine(name, spec).unit for name, spec in law.specs()}
-    assert specs == {"A": "m^2/s", "b": "1", "Ea": "J/mol"}
-    assert pytest.approx(5.13e8 / AVOGADRO) == law.A
 
 
 def test_literature_numbers_come_back():

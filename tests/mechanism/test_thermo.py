@@ -11,7 +11,6 @@ import surfacechem
 from surfacechem.documents import cases, mechanisms
 from surfacechem.errors import InputError
 from surfacechem.runs import rerun
-from surfacechem.solve.run import Model
 
 SPECIES = "interface.mechanism.species"
 STIFFNESS, ENTROPY, CAPACITY = (f"{SPECIES}.bond(s).{name}" for name in ("stiffness", "s0", "cp0"))
@@ -52,26 +51,6 @@ def test_a_number_that_is_changed_is_that_of_the_file(tmp_path, path):
     expected = changed.run(run=even, error="balances")
     check(surfacechem.load("press-hold-pull", {path: value}).run(run=even, error="balances"), expected)
     check(surfacechem.load("press-hold-pull").run({path: value}, even, error="balances"), expected)
-
-
-def test_the_equations_name_what_may_change():
-    system = surfacechem.load("press-hold-pull").system
-    named = {p.path: (str(p.symbol), p.spec.unit, p.value) for p in system.parameters}
-    assert named[STIFFNESS] == ("stiffness_bond_s", "N/m", pytest.approx(5.3e-3))
-    assert named[ENTROPY] == ("s0_bond_s", "J/(mol K)", 19.14475)
-    force = next(item.expression for item in system.named if item.name == "f_theta_bond_s")
-    assert str(force) == "g_n*stiffness_bond_s"
-    assert {CAPACITY, ORDER} <= set(system.constants)  # at their defaults they are numbers until they are changed
-
-
-def test_a_sweep_compiles_once(monkeypatch):
-    simulation = surfacechem.load("press-hold-pull", ["run.until=1 s"])
-    assert simulation.model
-    made = []
-    monkeypatch.setattr(Model, "__init__", lambda *_: made.append(1))
-    swept = simulation.sweep({STIFFNESS: [4e-3, 6e-3], "interface.mechanism.reactions.R1.A": ["0.01 1/s", "0.04 1/s"]})
-    assert not made
-    assert swept.dataset.sizes[STIFFNESS.rpartition(".")[2]] == 2
 
 
 @pytest.mark.parametrize(

@@ -96,20 +96,6 @@ def test_fold_of_the_cluster_with_rebinding():
         _ = get("rebinding-cluster")(**cluster(0.279, 1.0)).steady_state
 
 
-@pytest.mark.parametrize("load", [0.27847, 0.3, 20.0])
-def test_lifetime_above_the_fold(load):
-    """The quadrature of the rate as it stands, with 40 digits."""
-    bonds = get("rebinding-cluster")(**cluster(load, 1.0))
-    fold = bonds.critical_state
-    ladder = [fold * (1 + side * mpmath.mpf(10) ** -k) for k in range(1, 9) for side in (-1, 1)]
-    with mpmath.workdps(40):
-        F = mpmath.mpf(bonds.load)
-        points = sorted([0, fold / 100, fold / 3, fold, 3 * fold, 1, *ladder])
-        exact = mpmath.quad(lambda phi: 1 / (phi * mpmath.exp(F / phi) - (1 - phi)), points)
-    known = 1e-15 / abs(load / bonds.critical_load - 1)  # the rounding of the load against its distance from the fold
-    assert_exact(bonds.end_time, float(exact), relative=RELATIVE + known)
-
-
 def test_springs_in_equilibrium():
     data = table("x_latticegas_equilibrium")
     film = build("lattice-gas-springs", data.parameters, epsilon=data.parameters["eps"])
@@ -117,12 +103,6 @@ def test_springs_in_equilibrium():
     assert_exact(film.equilibrium(data.columns["g"]), data.columns["phi_eq"])
     for epsilon in (-1e-17, -1e-19, 1e-19, 1e-17, 1e-15):
         assert 0 <= replace(film, epsilon=epsilon).equilibrium(1e-9) <= 1
-
-
-def test_springs_relax_at_a_held_gap():
-    film = get("lattice-gas-springs")(n_c=1e16, epsilon=1e-21, k_b=1e-3, T=300.0, g_n=2e-9, k_i=3.0)
-    t, equilibrium = np.array([0.0, 1e-12, 0.1, 1e3]), float(film.equilibrium(2e-9))
-    assert_exact(film.solution(t)["phi"], -equilibrium * np.expm1(-3.0 / equilibrium * t))
 
 
 def test_cure_that_nothing_starts_is_refused():
