@@ -27,6 +27,13 @@ LONG = (
 """Files that take longest: they go first, so that no worker is left alone with one of them at the end."""
 
 
+def pytest_ignore_collect(collection_path, config):
+    """Of files that are around the core as a whole nothing is imported where none of them is asked for."""
+    if "not around" not in config.option.markexpr or not collection_path.name.startswith("test_"):
+        return None
+    return "\npytestmark = pytest.mark.around\n" in collection_path.read_text(encoding="utf-8") or None
+
+
 def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG))
 

@@ -14,6 +14,8 @@ from surfacechem.laws import coolprop
 from surfacechem.laws.free_energy import NormalStiffness
 from surfacechem.surfaces.shapes import Heights
 
+pytestmark = pytest.mark.around
+
 NUMBERS = [[0.1, float("inf"), 1e-300], None, "a text"]
 
 

@@ -10,6 +10,8 @@ from surfacechem.errors import InputError, nearest
 from surfacechem.format import load, load_text
 from surfacechem.format.schema import schema
 
+pytestmark = pytest.mark.around
+
 GOOD = """\
 T_0: 300 K
 bodies:

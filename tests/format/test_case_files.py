@@ -11,6 +11,8 @@ from surfacechem import references
 from surfacechem.documents import document
 from surfacechem.format import names, schema
 
+pytestmark = pytest.mark.around
+
 VALIDATOR = jsonschema.Draft202012Validator(schema.schema())
 
 

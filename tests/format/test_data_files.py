@@ -14,6 +14,8 @@ from surfacechem.format.schema import schema
 from surfacechem.laws import find
 from surfacechem.surfaces.projection import Shape, Surface
 
+pytestmark = pytest.mark.around
+
 CASE = """
 T_0: 300 K
 bodies:

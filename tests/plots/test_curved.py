@@ -6,6 +6,8 @@ from case_runs import solved
 
 from surfacechem.plots import figure
 
+pytestmark = pytest.mark.around
+
 
 @pytest.fixture(scope="module")
 def dataset():

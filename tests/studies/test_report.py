@@ -1,6 +1,10 @@
 """Formulas as MathML."""
 
+import pytest
+
 from surfacechem.studies.report import mathml
+
+pytestmark = pytest.mark.around
 
 
 def test_lines_stand_below_each_other_and_align():

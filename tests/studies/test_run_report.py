@@ -19,6 +19,8 @@ from surfacechem.results import spatial
 from surfacechem.studies import run_report
 from surfacechem.studies.report import typeset_equation
 
+pytestmark = pytest.mark.around
+
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 PHONE = 390
 LARGEST = 1_000_000
