@@ -16,7 +16,6 @@ from surfacechem.laws.factors import LinearInTemperature, Proportional
 from surfacechem.laws.free_energy import (
     BondedContact,
     BondEnergy,
-    BondSprings,
     BondStiffness,
     LatticeGas,
     LinearEnthalpy,
@@ -27,7 +26,6 @@ from surfacechem.laws.kinetics import (
     Bell,
     Bimolecular,
     DudkoHummerSzabo,
-    ExponentialAffinity,
     KamalSourour,
     LinearAffinity,
     MassAction,
@@ -35,7 +33,6 @@ from surfacechem.laws.kinetics import (
 )
 from surfacechem.laws.loading import Hold, Table
 from surfacechem.model.assemble import assemble
-from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Body, Interface, Mounting, Scene, Sites
 from surfacechem.solve.run import Model, Run
@@ -82,12 +79,6 @@ def test_bonds_are_gone_until_the_law_forms_them_again():
     assert phi[-1] > 0.5
 
 
-def test_no_bond_at_the_start_under_a_load_that_allows_none():
-    trajectory = closed(damage(phi=0.0, gaps=(TOP, TOP)), 1.0)
-    assert [(jump.edge.name, jump.t) for jump in trajectory.jumps] == [("unbonded", 0.0)]
-    assert np.all(trajectory.everywhere("phi") == 0.0)
-
-
 def test_a_limit_frees_complete_bonding():
     """Bonds that were held at their upper bound break at once, and form again."""
     potentials, laws = [BondedContact(E_n=1e13), LinearEnthalpy(H_r=2.0)], [LinearAffinity(c_r=SITES.density)]
@@ -131,14 +122,6 @@ def test_bonds_too_strong_for_an_equilibrium_below_the_bound_are_complete(epsilo
     assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
 
 
-@pytest.mark.parametrize("phi_eq", [0.0, 1.0])
-def test_an_equilibrium_at_a_bound_is_approached_and_not_hit(phi_eq):
-    """Bonds relax towards it for ever: nothing would carry them beyond."""
-    trajectory = closed(isothermal(FORMS, potentials=[BondEnergy(K_0=K, phi_eq=phi_eq)]), 2.0)
-    assert trajectory.jumps == ()
-    assert trajectory.end("phi") == pytest.approx(phi_eq, abs=1e-12)
-
-
 def test_a_bound_that_only_a_branch_of_the_rate_passes():
     """Cohesion in proportion to the bonds pays for more of them than there are sites; gap and temperature are held."""
     strength = varying(1e6, Proportional(of="phi"), LinearInTemperature(of="T_c", slope=-1e-3))
@@ -149,22 +132,6 @@ def test_a_bound_that_only_a_branch_of_the_rate_passes():
     driven = 2 * 1e6 * 1e-7 / K  # e t_max g_0 (1 + g/g_0) exp(-g/g_0) over K at g = g_0
     assert complete.t == pytest.approx(math.log((driven + 0.75) / driven) / RATE, rel=1e-11)
     assert trajectory.end("phi") == 1.0
-
-
-def test_mixing_entropy_yields_to_stretched_springs():
-    """An equilibrium of exp(-1000) bonds is none: they are gone, and form again as the gap closes."""
-    potentials = [LatticeGas(epsilon=6e-20), BondSprings(k_b=1e-3)]
-    loading = {"g_n": Table(times=[0.0, 1.0, 2.0], values=[0.0, 1e-7, 0.0])}
-    trajectory = closed(
-        together(potentials, loading=loading, initial={"phi": 0.5}, reactions=[ExponentialAffinity(C_r=1e34)]),
-        2.0,
-        outputs=81,
-    )
-    assert trajectory.events == ["unbonded", "rebond"]
-    assert trajectory.everywhere("phi").min() > -1e-14
-    gap = math.sqrt(2 * (6e-20 - BOLTZMANN * 300.0 * math.log(1e-15)) / 1e-3)
-    assert trajectory.jumps[1].t == pytest.approx(2 - gap / 1e-7, rel=1e-4)
-    assert trajectory.end("phi") > 1e-6
 
 
 def test_a_law_that_is_undefined_at_a_bound_leaves_the_range_there():

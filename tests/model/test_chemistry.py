@@ -1,19 +1,16 @@
 """Bonds under load in a scene: who carries what, when bonds rupture, and survival however small."""
 
 import math
-import re
-from itertools import product
 
 import numpy as np
 import pytest
-import symengine
 from solved import solve
 
 import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.laws.free_energy import BondSprings, LatticeGas, NormalStiffness
-from surfacechem.laws.kinetics import Bell, DemboSpring, DudkoHummerSzabo, ReversibleBell, TwoPathway
-from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.laws.kinetics import Bell, ReversibleBell
+from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.audit import audit
@@ -41,17 +38,6 @@ def solved(scene, *times, **settings):
 # -- who carries the load ---------------------------------------------------------------------------------------------
 
 
-def test_bonds_share_the_tension_and_feel_no_compression():
-    loading = {"t_n": Harmonic(amplitude=UNIT * SITES, frequency=0.25)}
-    trajectory = solved(isothermal(Bell(k_off=0.1, x_off=X, k_on=1.0), loading), *np.linspace(0.1, 4.0, 40))
-    values = trajectory
-    phi = trajectory.result.outputs[:, 0]
-    np.testing.assert_allclose(values["f"], np.maximum(values["t_n"], 0) / (SITES * phi), rtol=1e-12, atol=1e-26)
-    assert audit(trajectory).site_error < 1e-10
-    restarts = trajectory.result.events.t
-    assert np.allclose(restarts, [2.0], atol=1e-9) or np.allclose(restarts, [2.0, 4.0], atol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("loading", "potentials", "message"),
     [
@@ -69,19 +55,6 @@ def test_a_load_has_one_role(loading, potentials, message):
 
 
 # -- rupture ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("jump", [0.5, 30.0, 290.0, 1e6])
-def test_a_sudden_load_breaks_bonds_when_it_comes(jump):
-    """From exponents of one half to a million, and never a number that is none."""
-    load = UNIT * SITES
-    loading = {"t_n": Table(times=[0.0, 1.0, 1.0, 30.0], values=[0.0, 0.0, jump * load, jump * load])}
-    trajectory = solved(isothermal(Bell(k_off=1e-3, x_off=X), loading), 0.5, 2e3)
-    assert trajectory.status == "stopped"
-    assert re.match("the bonds ruptured (at|near) t = ", trajectory.reason)
-    assert np.isfinite(trajectory.outputs).all()
-    assert trajectory.result.t >= 1.0
-    assert jump < 30 or trajectory.result.t == pytest.approx(1.0, abs=1e-9)
 
 
 def test_a_load_beyond_reason_is_refused_at_the_start():
@@ -132,35 +105,6 @@ def test_initial_logarithms_are_checked(initial, message):
     with pytest.raises(InputError) as error:
         assemble(Scene(scene.bodies, scene.interface, loading=scene.loading, initial=initial))
     assert message in str(error.value)
-
-
-# -- laws -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "law",
-    [
-        SLIP,
-        ReversibleBell(k_off=1.0, x_off=X),
-        DemboSpring(k_off=1.0, stiffness=2e-3, transition_stiffness=1e-3, k_on=1.0),
-        DemboSpring(k_off=1.0, stiffness=1e-3, transition_stiffness=2e-3, k_on=1.0),
-        TwoPathway(k_slip=0.1, x_slip=2e-10, k_catch=100.0, x_catch=2e-9),
-        DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-20, nu=0.5),
-        DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-20),
-        DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-20, nu=1.0),
-    ],
-    ids=lambda law: law.name() if hasattr(law, "name") else None,
-)
-def test_no_force_makes_a_number_that_is_none(law):
-    """Values and slopes are finite, in compression too."""
-    names = ("phi", "n_c", "f", "T_c", "mu")
-    symbols = {name: symengine.Symbol(name) for name in names if name in law.rate.__code__.co_varnames}
-    rate = law.rate(**symbols)
-    rows = [rate, *(symengine.diff(rate, symbol) for symbol in symbols.values())]
-    function = symengine.Lambdify(list(symbols.values()), rows)
-    for f, phi in product((0.0, 3e-12, -3e-12, 1e-9, 1e-6, 1e3, -1e3), (0.0, 1e-12, 0.5, 1.0)):
-        point = {"phi": phi, "n_c": SITES, "f": f, "T_c": 300.0, "mu": -1e-20}
-        assert np.isfinite(function([point[name] for name in symbols])).all(), (f, phi)
 
 
 # -- contact enthalpy per bonding site, and the class of a reaction by its heat ---------------------------------------

@@ -14,17 +14,13 @@ from surfacechem.laws.factors import Proportional
 from surfacechem.laws.free_energy import (
     BondedContact,
     BondEnergy,
-    BondSprings,
     BondStiffness,
     LinearEnthalpy,
     NormalStiffness,
-    Penalty,
 )
 from surfacechem.laws.friction import Viscous
-from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import (
-    ElectrostaticFlatFlat,
     LennardJonesDerjaguin,
     LennardJonesFlatFlat,
     LennardJonesSpherePlane,
@@ -75,33 +71,12 @@ def test_attraction_that_nothing_bears_snaps_to_no_equilibrium(law, k, far):
     assert trajectory.energy_error < 1e-8
 
 
-@pytest.mark.parametrize(("law", "k", "far"), ATTRACTIVE)
-def test_with_a_contact_the_same_snap_is_borne(law, k, far):
-    E_n = 1e20
-    loading = {"w_n": Table(times=[0.0, 5.0], values=[far, 1e-9])}
-    trajectory = solve(scene([law, Penalty(E_n=E_n)], loading, Mounting(k=k), {"g_n": far}), 5.0)
-    assert (trajectory.status, [jump.verdict for jump in trajectory.jumps]) == ("finished", ["admissible"])
-    contact = law.bind({}).energy
-    pull = (contact(g_n=0.0) - contact(g_n=-1e-12)) / 1e-12
-    assert trajectory.end("g_n") == pytest.approx((k * 1e-9 - pull) / (k + E_n), rel=1e-6)
-
-
 @pytest.mark.parametrize(("law", "k", "far"), REPULSIVE)
 def test_repulsion_ends_the_snap_before_the_pole(law, k, far):
     trajectory = approach(law, k, far)
     assert (trajectory.status, [jump.verdict for jump in trajectory.jumps]) == ("finished", ["admissible"])
     assert 0.01 * law.g_0 < trajectory.end("g_n") < law.g_0
     assert assemble(scene([law], {"w_n": Hold(level=far)}, Mounting(k=k), {"g_n": far})).warnings == ()
-
-
-def test_charges_that_pull_a_spring_shut():
-    """A constant pull: g = w - t / k, zero at w = t / k."""
-    law, k, rate = ElectrostaticFlatFlat(s_1=1e-4, s_2=-2e-4), 1e12, -1e-9
-    pull = 1e-4 * 2e-4 / (2 * 8.8541878128e-12)
-    trajectory = solve(scene([law], {"w_n": Ramp(start=5e-9, rate=rate)}, Mounting(k=k), {"g_n": 4e-9}), 10.0)
-    assert (trajectory.status, trajectory.reason.partition(" at t")[0]) == ("stopped", CLOSED)
-    assert trajectory.result.t == pytest.approx((5e-9 - pull / k) / 1e-9, rel=1e-3)
-    assert trajectory.result.t == pytest.approx((5e-9 - pull / k + 1e-12) / 1e-9, rel=1e-8)
 
 
 class OddPole(Potential):
@@ -170,31 +145,7 @@ def test_a_gap_given_closed_is_refused_with_the_remedy():
         solve(given, 2.0)
 
 
-@pytest.mark.parametrize(("phi", "status"), [(1.0, "finished"), (0.0, "stopped")])
-def test_springs_bear_contact_only_while_there_are_bonds(phi, status):
-    """They push the mass back; without them it comes through."""
-    law, extra = LinearAffinity(c_r=1e-30), {"sites": SITES}
-    potentials, initial = [BondSprings(k_b=1e-9), BondEnergy(K_0=1.0)], {"g_n": 1e-6, "v_n": -1e-3, "phi": phi}
-    trajectory = solve(
-        scene(potentials, {"F_n": Hold(level=0.0)}, Mounting(m=4.0), initial, reactions=[law], **extra), 1e-2
-    )
-    assert trajectory.status == status
-
-
 # -- bonds, and what limits them ---------------------------------------------------------------------------------------
-
-
-def test_a_body_bounces_on_a_contact_that_is_not_bonded():
-    """Free flight between touches, half a period of the spring in contact: back at its height after both."""
-    m, E_n, F, g_0 = 4.0, 5e9, 39.0, 1e-3
-    given = scene([BondedContact(E_n=E_n)], {"F_n": Hold(level=-F)}, Mounting(m=m), {"g_n": g_0})
-    omega, fall = math.sqrt(E_n / m), math.sqrt(2 * g_0 * m / F)
-    speed, sag = F / m * fall, F / E_n
-    contact = 2 * (math.pi - math.atan2(speed / omega, sag)) / omega
-    trajectory = solve(given, 2 * fall + contact)
-    assert trajectory.events == ["touch", "release"]
-    assert trajectory.jumps[0].t == pytest.approx(fall, rel=1e-10)
-    assert trajectory.end("g_n") == pytest.approx(g_0, rel=1e-8)
 
 
 @pytest.mark.parametrize(("start", "carried"), [(1e-6, 0.0), (0.0, 1.0)])

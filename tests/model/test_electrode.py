@@ -68,18 +68,6 @@ def test_under_a_current_the_reactions_come_to_carry_it(edge):
     assert float(data["i_electron"][-1]) == pytest.approx(3.0, rel=1e-6)
 
 
-def test_books_of_charge_and_energy():
-    text = "electric-potential: -2.9 V, capacitance: 0.2 F/m^2, current: {ramp: {rate: -2 A/m^2/s}}"
-    solution = surfacechem.load(case(text, until="3 s")).run(error="balances")
-    data = solution.dataset
-    t, V = data["time"].values, data["V_electron"].values
-    np.testing.assert_allclose(0.2 * (V - V[0]), -CHARGE * data["made_electron"] - t**2, atol=1e-6)
-    np.testing.assert_allclose(data["E_electron"], 0.1 * V**2, rtol=1e-14)
-    np.testing.assert_allclose(data["E_electron"] - data["E_electron"][0], data["W_electron"], atol=1e-6)
-    assert solution.audit.energy_error < 1e-6
-    assert float(solution.audit.least["R1"]) >= 0
-
-
 def test_at_rest_under_a_current(edge):
     """The reaction carries what is given, whatever its rate constant; the potential makes up for it."""
     text = case("electric-potential: -2.9 V, capacitance: 0.2 F/m^2, current: -3 A/m^2")
@@ -89,15 +77,6 @@ def test_at_rest_under_a_current(edge):
     assert rest.rates["i_electron"] == pytest.approx(3.0, rel=1e-9)
     assert rest.control["i_electron"]["R1"] == pytest.approx(0.0, abs=1e-6)
     assert "V_electron  -2.9" in str(rest)
-
-
-def test_a_capacitance_is_a_parameter():
-    simulation = surfacechem.load(case("electric-potential: -3.3 V, capacitance: 0.2 F/m^2", until="1 ms"))
-    slow = simulation.run({"interface.mechanism.neighbours.electron.capacitance": 2000.0}, error="balances")
-    assert slow.trajectory.model is simulation.run().trajectory.model
-    assert float(slow.dataset["V_electron"][-1]) == pytest.approx(-3.3, abs=0.01)
-    moved = simulation.run({"initial.V_electron": -2.0}, error="balances")
-    assert float(moved.dataset["V_electron"][0]) == -2.0
 
 
 def test_beside_a_particle_that_fills(tmp_path):

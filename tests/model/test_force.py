@@ -39,19 +39,6 @@ def in_contact(potentials, pressure="contact", g_n=0.0, w_n=0.0, k=1e14):
     return Scene(bodies(), interface, heat, loading, T_0=300.0, initial=initial, normal=Mounting(k=k))
 
 
-def test_attraction_presses_the_surfaces_together():
-    """Contact bears the pull of van der Waals; friction and conduction are of that pressure."""
-    found = solve(in_contact([Penalty(E_n=E_N), ATTRACTION]), 1.0)
-    g = -PULL / (E_N + 1e14)  # the far field stretches a little
-    assert found["p_contact"][-1] == pytest.approx(-E_N * g, rel=1e-10)
-    assert found["t_coulomb"][-1] == pytest.approx(-0.3 * E_N * g, rel=1e-10)
-    T_1, T_2 = (found.end(x) for x in ("T_1", "T_2"))
-    h = 1e5 * -E_N * g / 1e9
-    assert found["q_12"][-1] == pytest.approx(h * (T_1 - T_2), rel=1e-10)
-    net = solve(in_contact([Penalty(E_n=E_N), ATTRACTION], "net"), 1.0)
-    assert net["t_coulomb"][-1] == 0.0
-
-
 def test_repulsion_of_a_lennard_jones_contact():
     """At the gap without traction repulsion and attraction are equal, A g_0 x^3 / 3 with x^6 = 15."""
     flats = LennardJonesFlatFlat(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)

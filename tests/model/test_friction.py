@@ -452,22 +452,6 @@ run: {until: 6 ms}
     assert rates[column] == 0
 
 
-def test_a_step_ends_where_no_pressure_is_left():
-    """Friction bends there: a contact that pulls as well as it presses does not rub while it pulls."""
-    case = """
-bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
-interface:
-  temperature: 300 K
-  potential: [normal-stiffness: {E_n: 1 MPa/um}]
-  friction: [coulomb: {mu: 0.3}]
-mechanics: {normal: {k: 1 MPa/um}, tangential: {k: 1 MPa/um, m: 1e4 kg/m^2}}
-loading: {w_n: {harmonic: {amplitude: 2 um, frequency: 300 Hz}}, w_t: 0 m}
-initial: {v: 50 mm/s}
-run: {until: 9 ms, rtol: 1e-8}
-"""
-    assert surfacechem.run(case).accuracy.error < 1e-7
-
-
 TURNING = """
 bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
 interface:
@@ -527,20 +511,6 @@ def test_what_a_drive_that_rests_has_left_sticks(changes, expected):
         name: pytest.approx(each, rel=1e-12) for name, each in expected.items()
     }
     assert run.accuracy.error < 1e-12
-
-
-@pytest.mark.parametrize("potentials", [(), (TangentialStiffness(E_t=1e12),)])
-def test_slip_that_stops_with_its_drive_goes_on_as_its_limit_falls(potentials):
-    """The pressure is largest where the drive stops, so that slip is at rest there and goes on at once."""
-    drive, pressure = (
-        Table(times=[0.0, 2.0, 6.0], values=[0.0, 2e-6, 2e-6]),
-        Harmonic(mean=6e4, amplitude=4e4, frequency=0.125),
-    )
-    loading, mount = {"p": pressure, "w_t": drive}, Mounting(k=1e11)
-    found = closed(together(potentials, [Coulomb(mu=0.5)], loading, tangential=mount), 5.5, outputs=12)
-    late = found.result.times >= 2.0
-    left = 0.5 * (6e4 + 4e4 * np.sin(0.25 * np.pi * found.result.times[late])) / 1e11
-    np.testing.assert_allclose(found["u_t"][late], 2e-6 - left, rtol=1e-9)
 
 
 @pytest.mark.parametrize("rtol", [1e-9, 1e-11])

@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 from scenes import bodies, together, varying
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
-from solved import Solved, closed, solve
+from solved import closed, solve
 
 from surfacechem.contracts.terms import Load
 from surfacechem.errors import InputError
@@ -17,9 +15,7 @@ from surfacechem.laws.friction import (
     AnisotropicCoulomb,
     AnisotropicViscous,
     Coulomb,
-    MohrCoulomb,
     RateAndStateAging,
-    Stribeck,
     Viscous,
 )
 from surfacechem.laws.loading import Harmonic, Hold, Ramp
@@ -38,25 +34,8 @@ def scene(frictions, mount=FREE, initial=None, transverse=None, potentials=(), p
     return together(potentials, frictions, histories, initial, pair=pair, programme=programme, **mounts)
 
 
-def moments(solved: Solved) -> list[float]:
-    """Times of the events, those that follow each other at once as one."""
-    times = [jump.t for jump in solved.jumps]
-    return [t for before, t in zip([-1.0, *times], times, strict=False) if t > before * (1 + 1e-7)]
-
-
 def close(found, exact, tolerance=1e-10):
     assert np.max(np.abs(found - exact)) <= tolerance * np.max(np.abs(exact))
-
-
-CIRCLE = {"w_t": Harmonic(amplitude=2e-3, frequency=1.0), "w_t2": Harmonic(amplitude=1.5e-3, frequency=1.0, phase=1.0)}
-
-
-def circling(t):
-    a = 2 * math.pi
-    return (
-        np.array([2e-3 * math.sin(a * t), 1.5e-3 * math.sin(a * t + 1.0)]),
-        np.array([2e-3 * a * math.cos(a * t), 1.5e-3 * a * math.cos(a * t + 1.0)]),
-    )
 
 
 # -- stops of a free mass -------------------------------------------------------------------------------------------
@@ -78,33 +57,6 @@ def test_a_slide_across_a_dead_load_curves_into_it(kappa, v):
     assert solved["heat_coulomb"][-1] == pytest.approx(heat, rel=1e-10)
 
 
-# -- one component, rotated -----------------------------------------------------------------------------------------
-
-FRICTIONS = [
-    [Coulomb(mu=0.4, mu_s=0.6)],
-    [MohrCoulomb(mu=0.3, t_n_max=2e4, c=5e3, mu_s=0.5)],
-    [Stribeck(mu_s=0.6, mu_k=0.4, v_s=1e-3, c_v=1e3), Coulomb(mu=0.1)],
-]
-
-
-@pytest.mark.parametrize("frictions", FRICTIONS)
-def test_stick_slip_along_a_line_is_that_of_one_component(frictions):
-    mount = Mounting(k=1e8, m=10.0, c_b=100.0, c_g=100.0)
-    times = np.linspace(0, 1.1, 21)
-    one = closed(scene(frictions, mount, p=1e5, w_t=Ramp(rate=1e-3)), times)
-    assert len(one.jumps) > 1
-    for angle in (0.7, math.pi):
-        c, s = math.cos(angle), math.sin(angle)
-        both = closed(scene(frictions, mount, p=1e5, w_t=Ramp(rate=1e-3 * c), w_t2=Ramp(rate=1e-3 * s)), times)
-        # A slip begins within the tolerance of its time, in which what slides goes on by its velocity.
-        along = np.abs(both["u_t"] * c + both["u_t2"] * s - one["u_t"])
-        assert np.all(along <= 1e-9 * (one["u_t"].max() + np.abs(one["v"]) * times))
-        assert np.max(np.abs(both["u_t"] * s - both["u_t2"] * c)) < 1e-12 * one["u_t"].max()
-        close(both["E_total"], one["E_total"], 1e-9)
-        close(both["t_t"] * c + both["t_t2"] * s, one["t_t"], 1e-6)
-        assert moments(both) == pytest.approx(moments(one), rel=1e-9)
-
-
 # -- beginning on the ellipse, and independent integrations ---------------------------------------------------------
 
 
@@ -119,33 +71,6 @@ def test_sticking_gives_way_on_the_ellipse():
     assert solved["t_t"][1] == pytest.approx(k * x * times[1], rel=1e-13)
     assert solved["t_t2"][1] == pytest.approx(k * y * times[1], rel=1e-13)
     assert solved["v_2"][2] / solved["v"][2] == pytest.approx(y / 0.5 / (x / 0.2), rel=1e-2)
-
-
-def cartesian(mu, m, k, c, far, p=1e5):
-    """Right-hand side of the plane in components of the velocity, for speeds that do not vanish."""
-
-    def rates(t, state):
-        u, v = state[:2], state[2:]
-        w, w_dot = far(t)
-        force = k * (w - u) + c * (w_dot - v) - p * np.asarray(mu) * v / np.linalg.norm(v)
-        return np.concatenate([v, force / m])
-
-    return rates
-
-
-def test_dragging_in_a_circle():
-    law, mu = AnisotropicCoulomb(mu_1=0.2, mu_2=0.5), (0.2, 0.5)
-    n, (w_i, w_dot) = np.array([0.9, 0.4]) / math.hypot(0.9, 0.4), circling(0.0)
-    u, v = w_i - 1e5 * np.asarray(mu) * n / 1e8, n * np.linalg.norm(w_dot)
-    mount, start = Mounting(k=1e8, m=10.0, c_b=1e4), {"u_t": u[0], "u_t2": u[1], "v": v[0], "v_2": v[1]}
-    times = np.linspace(0, 0.1, 21)
-    solved = closed(scene([law], mount, start, p=1e5, **CIRCLE), times)
-    assert not solved.events
-    state = [*u, *v]
-    rates = cartesian(mu, 10.0, 1e8, 1e4, circling)
-    found = solve_ivp(rates, (0, 0.1), state, "LSODA", t_eval=times, rtol=1e-12, atol=1e-15).y
-    for name, value in zip(("u_t", "u_t2", "v", "v_2"), found, strict=True):
-        close(solved[name], value, 2e-8)
 
 
 def test_what_bears_nothing_across_slides_there():
@@ -195,35 +120,6 @@ def test_friction_opposes_a_prescribed_velocity(law, along, across):
     found, name = closed(scene([law], None, v=3.0, v_2=-4.0, **given), [0.0, 1.0]), law.name().replace("-", "_")
     assert (found[f"t_{name}"][0], found[f"t_2_{name}"][0]) == pytest.approx((along, -across), rel=1e-14)
     assert found[f"D_{name}"][-1] == pytest.approx(3.0 * along + 4.0 * across, rel=1e-14)
-
-
-def test_dampers_beside_friction_that_knows_directions():
-    """What pulls is resisted by friction and damper, (L + c s) n, which leaves one speed."""
-    k, L, damping = np.array([K, 3 * K]), np.array([0.2, 0.5]) * P, np.array([1e5, 1e6])
-    times = np.linspace(0, 0.4, 21)
-    mounts = Mounting(k=K, c_g=1e5), Mounting(k=3 * K, c_g=1e6)
-    u = circling(0.0)[0] - 0.999 * L * np.array([0.6, 0.8]) / k
-    rough = [AnisotropicCoulomb(mu_1=0.2, mu_2=0.5)]
-    solved = closed(scene(rough, mounts[0], {"u_t": u[0], "u_t2": u[1]}, mounts[1], p=P, **CIRCLE), times)
-
-    def rates(t, state):
-        pull = k * (circling(t)[0] - state)
-        if np.linalg.norm(pull / L) <= 1:
-            return [0.0, 0.0]
-
-        def beyond(s):
-            return np.linalg.norm(pull / (L + damping * s)) - 1
-
-        s = brentq(beyond, 0, np.linalg.norm(pull) / damping.min(), xtol=1e-300, rtol=1e-15)
-        return pull / (L + damping * s) * s
-
-    begun = solved.jumps[0].t
-    assert solved.events[0] == "slip"
-    sliding = times > begun
-    found = solve_ivp(rates, (begun, 0.4), u, "LSODA", t_eval=times[sliding], rtol=1e-10, atol=1e-16).y
-    close(solved["u_t"][sliding], found[0], 1e-7)
-    close(solved["u_t2"][sliding], found[1], 1e-7)
-    assert np.all(solved["D_anisotropic_coulomb"] >= 0)
 
 
 def test_dampers_relax_each_on_its_own_where_nothing_presses():

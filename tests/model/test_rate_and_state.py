@@ -12,7 +12,6 @@ import surfacechem
 from surfacechem.contracts.terms import Varying
 from surfacechem.errors import InputError
 from surfacechem.laws.factors import Linear, LinearInTemperature
-from surfacechem.laws.free_energy import TangentialStiffness
 from surfacechem.laws.friction import Coulomb, RateAndStateAging, RateAndStateSlip
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.runs.check import consistent_start, rates
@@ -22,7 +21,6 @@ COLD = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
 P, K, M = 5e6, 2e9, 1e4
 STEADIED = {"mu_0": 0.6, "a": 0.014, "b": 0.008, "L": 5e-5, "v_0": 1e-6}
 WEAKENING = {"mu_0": 0.6, "a": 0.01, "b": 0.014, "L": 5e-5, "v_0": 1e-6}
-LAWS = [RateAndStateAging, RateAndStateSlip]
 
 
 def scene(law, mount, loading, parameters=STEADIED, initial=None, p=None, others=(), potentials=()):
@@ -59,29 +57,6 @@ def forward(law, pull, m, times, y, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6)
     found = solve_ivp(rates, (times[0], times[-1]), start, "LSODA", times, rtol=1e-12, atol=[1e-18, 1e-12, 1e-12])
     assert found.success
     return found.y[0], np.exp(found.y[1]), found.y[2]
-
-
-def reversals(trajectory):
-    v = trajectory.column("v")[1]
-    return int(np.sum(np.diff(np.sign(v[v != 0])) != 0))
-
-
-def test_stick_slip_is_that_of_the_plain_equations():
-    """Below the critical stiffness (b - a) p / L the block sticks and slips."""
-    law, V = RateAndStateSlip, 1e-3
-    k = 0.5 * 0.004 * P / 5e-5
-    start, theta = 0.6 * P / k, 0.8 * 5e-5 / V
-    loading = {"w_t": Ramp(start=start, rate=V)}
-    trajectory = solved(scene(law, Mounting(k=k, m=M), loading, WEAKENING, {"theta": theta, "v": V}), 2e-3 / V)
-    times = trajectory.result.times
-    u, v, ln_theta = forward(law, lambda t, u: k * (start + V * t - u), M, times, [0.0, V, np.log(theta)])
-    found = trajectory.everywhere("v")
-    assert found.max() > 20 * V
-    assert found.min() < 0.1 * V
-    np.testing.assert_allclose(trajectory["u_t"], u, rtol=0, atol=1e-8 * np.max(u))
-    np.testing.assert_allclose(trajectory["ln_theta"], ln_theta, rtol=0, atol=1e-7)
-    np.testing.assert_allclose(velocity(trajectory), v, rtol=1e-7)
-    assert trajectory.result.counters.steps < 1000
 
 
 def test_pressure_that_vanishes_frees_what_creeps():
@@ -126,21 +101,6 @@ def test_parameters_that_vary_with_temperature():
         item = Scene(warm, interface, (), load, None, 300.0, {"theta": 1.0}, tangential=Mounting(k=K, m=m))
         found.append(solved(item, 40.0)["u_t"])
     np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("law", "mount", "elastic"),
-    [(LAWS[0], Mounting(k=K, c_b=5e6), 1e13), (LAWS[1], Mounting(k=K, c_g=5e6), 0.0)],
-)
-def test_creep_reverses_twenty_times(law, mount, elastic):
-    """Below what it takes to slide: velocities from 1e-17 m/s through zero and back, in a few steps each."""
-    load, potentials = (
-        {"w_t": Harmonic(amplitude=1e-3, frequency=0.05)},
-        [TangentialStiffness(E_t=elastic)] * bool(elastic),
-    )
-    trajectory = solved(scene(law, mount, load, WEAKENING | {"a": 0.008}, potentials=potentials), 200.0)
-    assert reversals(trajectory) >= 19
-    assert trajectory.result.counters.steps < 20 * 60
 
 
 def test_the_age_at_the_start_is_changed_in_seconds():
@@ -190,21 +150,6 @@ def test_an_extreme_direct_effect_does_not_overflow():
     assert law.traction(p=1e6, v=1e-6, ln_theta=np.log(10.0)) == pytest.approx(6e5, rel=1e-12)
     assert law.traction(p=1e6, v=-1e-6, ln_theta=np.log(10.0)) == pytest.approx(-6e5, rel=1e-12)
     assert law.traction(p=1e6, v=0.0, ln_theta=np.log(10.0)) == 0.0
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_creep_with_a_mass_is_the_same_in_all_units(law):
-    """A heavy block that turns round: lengths, or times, may be smaller or larger by twelve decades."""
-    found = []
-    for length, time in ((1.0, 1.0), (1e-12, 1.0), (1.0, 1e12)):
-        parameters = STEADIED | {"L": STEADIED["L"] * length, "v_0": STEADIED["v_0"] * length / time}
-        load = {"w_t": Harmonic(amplitude=5e-3 * length, frequency=0.05 / time)}
-        mount = Mounting(k=K / length, m=1e7 * time**2 / length)
-        trajectory = solved(scene(law, mount, load, parameters, {"theta": time}), 20.0 * time)
-        found.append((trajectory["u_t"] / length, trajectory["drive"]))
-    for u, drive in found[1:]:
-        np.testing.assert_allclose(u, found[0][0], rtol=0, atol=1e-10 * np.max(np.abs(u)))
-        np.testing.assert_allclose(drive, found[0][1], rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize("length", [1e-9, 1e-6, 1e3, 1e9])

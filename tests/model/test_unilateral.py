@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from scenes import SITES, bodies, path, together, varying
+from scenes import SITES, bodies, together, varying
 from solved import closed, solve
 
 import surfacechem
@@ -31,29 +31,6 @@ def scene(mount, loading=PRESSED, initial=None, **more):
 
 
 # -- rebounds ----------------------------------------------------------------------------------------------------------
-
-
-def test_a_shaken_body_leaves_and_lands_as_it_has_to():
-    """Under F(t) = -a + b sin(w t) the body rests from each landing until the pull returns."""
-    a, b, turn = 10.0, 30.0, math.pi
-    trajectory = closed(
-        scene(Mounting(m=M), {"F_n": Harmonic(mean=-a, amplitude=b, frequency=0.5)}, {"g_n": 0.0}), 20.0
-    )
-    leaves = [jump.t for jump in trajectory.of("open")]
-    lands = [jump.t for jump in trajectory.of("impact")]
-    assert len(leaves) > 2
-    first = math.asin(a / b) / turn
-    assert [math.remainder(t - first, 2 * math.pi / turn) for t in leaves] == pytest.approx(
-        len(leaves) * [0], abs=1e-10
-    )
-
-    def gap(t, t_0):
-        tau = t - t_0
-        turned = math.sin(turn * t_0) + turn * tau * math.cos(turn * t_0) - math.sin(turn * t)
-        return (-a * tau**2 / 2 + b / turn**2 * turned) / M
-
-    for left, landed in zip(leaves, lands, strict=False):
-        assert gap(landed, left) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_pull_that_only_reaches_the_pressure_lets_nothing_go():
@@ -107,41 +84,6 @@ def test_bonds_hold_once_the_bodies_rest():
     assert -20 + 20 * (debond.t - 1) == pytest.approx(50.0 * phi, rel=1e-9)
     assert debond.t > 2.0
     assert all(jump.before.y[0] > 0.5 for jump in trajectory.of("impact"))
-
-
-def test_a_damper_closes_without_an_impact():
-    c, a, b = 10.0, 10.0, 30.0
-    load = Harmonic(mean=-a, amplitude=b, frequency=0.5)
-    trajectory = closed(scene(Mounting(c_g=c), {"F_n": load}, {"g_n": 0.1}), 3.0)
-    assert trajectory.events == ["touch", "open"]
-    touch, leaves = trajectory.jumps
-
-    def gap(t):
-        return 0.1 + (-a * t + b / math.pi * (1 - math.cos(math.pi * t))) / c
-
-    assert gap(touch.t) == pytest.approx(0.0, abs=1e-11)
-    assert leaves.t == pytest.approx(2 + math.asin(a / b) / math.pi, rel=1e-12)
-    assert trajectory.end("g_n") == pytest.approx(gap(3.0) - gap(leaves.t), rel=1e-9)
-
-
-# -- heat --------------------------------------------------------------------------------------------------------------
-
-
-def test_the_heat_of_impacts_is_in_the_bodies():
-    """In the shares of the mounting; the interface and a heat path see none of it at that instant."""
-    given = Scene(
-        bodies(), Interface("T_1"), [path("lower", "upper", 1e-3)], PRESSED, None, 300.0,
-        {"T_1": 300.0, "T_2": 300.0, "g_n": FELL}, normal=Mounting(m=M, e=0.5, beta_1=0.25),
-    )  # fmt: skip
-    trajectory = closed(given, 0.3)
-    (impact,) = trajectory.jumps
-    released = (1 - 0.25) * F * FELL
-    assert impact.released == pytest.approx(released, rel=1e-13)
-    for column, share, capacity in ((2, 0.25, 40.0), (3, 0.75, 25.0)):
-        before, after = impact.before.y[column], impact.after.y[column]
-        stored = capacity / 600.0 * (after**2 - before**2)
-        assert stored == pytest.approx(share * released, rel=1e-10)
-    assert impact.entropy > 0
 
 
 # -- friction ----------------------------------------------------------------------------------------------------------
@@ -297,25 +239,6 @@ def test_other_methods_see_the_impacts():
     assert other.events == (len(other.jumps) - 1) * ["impact"] + ["rest"]
     assert other.jumps[-1].t == pytest.approx(ours.jumps[-1].t, rel=1e-5)
     assert other["g_n"].min() >= 0
-
-
-def test_pressure_begins_at_once_under_a_damper_that_stands_still():
-    """What slides on springs sticks then, up to what the pressure bears; the strength of friction may vary."""
-    strength = varying(10.0, Linear(of="T_c", slope=-1e-3, about=300.0))
-    interface = Interface("T", [TangentialStiffness(E_t=1e3)], frictions=[MohrCoulomb(mu=0.5, t_n_max=strength)])
-    given = scene(
-        Mounting(k=100.0, c_g=20.0), {"w_n": Hold(level=-0.1), "w_t": Ramp(rate=0.5)}, {"u_t": 0.0},
-        interface=interface, tangential=Mounting(k=200.0),
-    )  # fmt: skip
-    trajectory = closed(given, 2.0)
-    touch = trajectory.of("touch")[0]
-    assert touch.t == pytest.approx(0.2 * math.log(3.0), rel=1e-9)
-    before, after = (trajectory.state(touch, "g_t", side) for side in ("before", "after"))
-    assert 1e3 * before == pytest.approx(5.0, rel=1e-3)
-    assert after == before
-    assert trajectory.events == ["slip forward", "touch", "slip forward"]
-    assert 1e3 * trajectory.state(trajectory.jumps[-1], "g_t") == pytest.approx(0.5 * (100.0 * 0.1 + 10.0), rel=1e-3)
-    assert trajectory.energy_error < 1e-10
 
 
 def test_a_method_that_passes_an_impact_fails(monkeypatch):

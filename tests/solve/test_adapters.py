@@ -16,7 +16,6 @@ from surfacechem.quantities import VARIABLES
 from surfacechem.results.event_table import event_times
 from surfacechem.solve import names, solver
 from surfacechem.solve.adapters import stepping
-from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Guard, Problem, Status
 from surfacechem.solve.diagnose import runaway, swiftest
 
@@ -47,17 +46,6 @@ def steep(name: str, row, start: float, end: float, **more):
     program = scalar(row, 2 * Y * DY)
     more |= {"times": [start, end], "record_steps": True}
     return solver(name).solve(problem(program, [1.0], [start, end], 1e-8, **more))
-
-
-@pytest.mark.parametrize("name", ["lsoda", "cantera"])
-def test_steps_ahead_take_no_more_than_the_time_that_is_left(name, monkeypatch) -> None:
-    ticks, reach, limit = [], Evaluation.reach, 130.0
-    monkeypatch.setattr(Evaluation, "reach", lambda self, *state: ticks.append(state) or reach(self, *state))
-    clock = SimpleNamespace(monotonic=lambda: float(len(ticks)), perf_counter=lambda: 0.0)  # a second an evaluation
-    monkeypatch.setattr(stepping, "time", clock)
-    result = steep(name, DY - se.cos(50 * T), 0.0, 50.0, max_seconds=limit)
-    assert result.status == Status.STOPPED
-    assert limit <= len(ticks) < 1.1 * limit
 
 
 LAYER = Y * DY - 1e17
@@ -103,26 +91,6 @@ def test_problem_is_checked() -> None:
 def test_factorizations_are_counted_where_the_library_tells(name: str) -> None:
     result = solver(name).solve(problem(scalar(DY + 1e4 * (Y - se.cos(T))), [1.0], [0.0, 1.0], 1e-6))
     assert result.counters.factorizations > 1
-
-
-@pytest.mark.parametrize("name", names)
-def test_a_state_at_rest_may_do_work(name: str) -> None:
-    """Nothing asks for short steps; what is booked on the way is exact all the same."""
-    program = scalar(DY, 2 * T * Y, 5 * T**4)
-    result = solver(name).solve(problem(program, [3.0], [0.0, 2.0], 1e-6, times=[0.0, 0.1, 0.7, 2.0]))
-    exact = np.stack([3 * result.times**2, result.times**5], axis=1)
-    np.testing.assert_allclose(result.ledger_outputs, exact, rtol=1e-12, atol=1e-13)
-    np.testing.assert_array_equal(result.ledger, result.ledger_outputs[-1])
-
-
-@pytest.mark.parametrize("name", names)
-def test_what_is_booked_is_as_accurate_as_the_state(name: str) -> None:
-    program = scalar(DY + Y, Y, -2 * Y * DY)
-    result = solver(name).solve(problem(program, [1.0], [0.0, 5.0], 1e-8, times=[0.0, 1.0, 5.0]))
-    exact = np.exp(-result.times)
-    found = result.ledger_outputs
-    np.testing.assert_allclose(found[:, 0], 1 - result.outputs[:, 0], atol=1e-8)
-    np.testing.assert_allclose(found, np.stack([1 - exact, 1 - exact**2], axis=1), atol=1e-6)
 
 
 @pytest.mark.parametrize("name", every(7, names))

@@ -97,32 +97,6 @@ def test_a_guard_that_jumps_right_after_no_time_is_found_there():
     assert t == pytest.approx(jump, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("values", "far"),
-    [
-        ([1.0, 1.1, 1.2], True),
-        ([1.0, 0.6, 0.9], True),
-        ([1.0, 0.4, 0.9], False),  # it may touch zero in between
-        ([1.0, 0.5, -0.1], False),
-        ([0.1, 0.18, 0.33], True),  # it grows
-        ([0.3, 0.2, 0.11, 0.2, 0.3], False),
-        ([0.0, 0.0, 0.0], True),
-        ([0.0, 0.1, 0.2], False),  # it leaves zero, to a side that is to be found
-    ],
-)
-def test_guards_far_from_zero_follow_a_step_at_once(values, far):
-    guards, stepwise = (Guards.of([Guard.restart()], lambda *_: np.zeros(1)) for _ in range(2))
-    rows = np.array(values)[:, None]
-    for each in (guards, stepwise):
-        each.start(rows[0])
-    assert guards.far(rows[:, None], np.ones(1, bool)) == far
-    if far:
-        for row in rows[1:]:
-            stepwise.follow(row)
-        for name in ("sides", "largest", "now"):
-            assert vars(guards)[name] == vars(stepwise)[name]
-
-
 def test_a_polynomial_follows_from_its_derivatives_at_the_ends_of_a_step():
     power = np.polynomial.Polynomial([3.0, -1.0, 4.0, 1.0, -5.0, 9.0])
     times = np.array([0.5, 2.0, 2.25])

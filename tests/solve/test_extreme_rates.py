@@ -1,4 +1,4 @@
-"""Rates far from one per second: tiny prefactors with large exponents, stiff pairs, orders below one, long chains.
+"""Rates far from one per second: tiny prefactors with large exponents, stiff pairs, orders below one.
 
 Every expectation is computed here from the rate laws alone, with SciPy or mpmath, and not by what is tested.
 """
@@ -72,12 +72,6 @@ TINY = "1e-239"
 """A barrier of 0.2 eV at 4 K: 1e13 1/s exp(-0.2 eV / k_B T)."""
 
 
-def pulled(rate, times):
-    """Bonds left when pulled at SPEED, with ``rate`` [1/s] a function of the force."""
-    with mpmath.workdps(30):
-        return [float(mpmath.exp(-mpmath.quad(lambda t: rate(SPEED * t), mpmath.linspace(0, t, 9)))) for t in times]
-
-
 def work(f, length=LENGTH):
     return mpmath.mpf(f) * length / (BOLTZMANN * COLD)
 
@@ -97,19 +91,6 @@ LOADED = {
 }
 RANGE = dict.fromkeys(LOADED, (100e-12, 106e-12))
 RANGE[next(name for name in LOADED if "dembo" in name)] = (580e-12, 591e-12)
-
-
-@pytest.mark.parametrize("law", LOADED)
-def test_a_bond_breaks_where_its_barrier_is_gone_however_cold(tmp_path, law):
-    """1e-239 1/s at rest breaks at about 102 pN at 20 pN/s, though the exponent of the load is beyond 500 there."""
-    times = [0.0, *(np.linspace(*RANGE[law], 8) / SPEED)]
-    loading = "loading: {f: {ramp: {rate: 20 pN/s}}}\ninitial: {phi: 1}"
-    solution = solve(tmp_path, f"sites: 1e14, bonding: [{law}]", times, T=COLD, more=loading)
-    exact = [1.0, *pulled(lambda f: mpmath.mpf(TINY) * LOADED[law](f), times[1:])]
-    assert max(exact[1:]) > 0.2
-    assert min(exact) < 0.9
-    np.testing.assert_allclose(bonded(solution), exact, rtol=0, atol=1e-9)
-    assert not any(CAPPED in text for text in solution.warnings)
 
 
 def test_the_warning_is_of_the_rate_and_not_of_its_exponent(tmp_path):
@@ -139,41 +120,6 @@ def test_factors_of_a_rate_are_one_exponential(tmp_path, law, energies):
     assert 0.1 < exact[1] < 0.9
     np.testing.assert_allclose(bonded(solution), exact, rtol=0, atol=1e-9)
     assert not any(CAPPED in text for text in solution.warnings)
-
-
-# -- long chains ------------------------------------------------------------------------------------------------------
-
-
-def test_a_long_chain_of_reversible_steps_warms_its_bodies(tmp_path):
-    """Coverages of 1e-100 behind the front: mixing entropy has an infinite slope there, the energy has none."""
-    length = 25
-    names = [f"s{i}" for i in range(length + 1)]
-    enthalpies = {name: float(i % 3) for i, name in enumerate(names)}
-    A = [1.0 + 0.1 * (i % 5) for i in range(length)]
-    steps = [
-        f"equation: {a} <=> {b}, rate-constant: {{A: {k}, b: 0, Ea: 0}}"
-        for a, b, k in zip(names[:-1], names[1:], A, strict=True)
-    ]
-    (tmp_path / "mech.yaml").write_text(mechanism(enthalpies, steps))
-    (tmp_path / "case.yaml").write_text(
-        """
-T_0: 300 K
-bodies: {l: {temperature: T, C: 1e9}, u: {temperature: T, C: 1e9}}
-interface: {temperature: T, mechanism: mech.yaml}
-initial: {T: 300 K, coverages: {s0: 1}}
-run: {times: [0, 1e-3, 10, 100]}
-"""
-    )
-    solution = surfacechem.load(tmp_path / "case.yaml").run(error="balances")
-    assert solution.status == "finished"
-    matrix = np.zeros((length + 1, length + 1))
-    for i, k in enumerate(A):
-        back = k * np.exp((enthalpies[names[i + 1]] - enthalpies[names[i]]) * 1e3 / (float(GAS) * 300))
-        matrix[[i, i + 1], [i, i]] += -k, k
-        matrix[[i, i + 1], [i + 1, i + 1]] += back, -back
-    found = np.array([solution.dataset[f"theta_{name}"].values for name in names])
-    for j, t in enumerate((0.0, 1e-3, 10.0, 100.0)):
-        np.testing.assert_allclose(found[:, j], scipy.linalg.expm(matrix * t)[:, 0], atol=1e-9)
 
 
 # -- orders below one ------------------------------------------------------------------------------------------------

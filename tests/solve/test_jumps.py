@@ -1,35 +1,21 @@
 """Jumps: the work of dead loads, gaps that share pressure, areas, and what an interface bears after it has debonded."""
 
-import numpy as np
 import pytest
 from scenes import bodies, path, together, varying
 from solved import closed, solve
 
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
-from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
-from surfacechem.laws.factors import Linear, LinearInTemperature
+from surfacechem.laws.cohesive import TensileStrength
+from surfacechem.laws.factors import LinearInTemperature
 from surfacechem.laws.free_energy import BondEnergy, NormalStiffness
-from surfacechem.laws.friction import BondedCoulomb, Coulomb
-from surfacechem.laws.kinetics import LinearAffinity
+from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Interface, Mounting, Scene
 
 PULLED, STIFF = {"w_n": Ramp(rate=1e-6)}, Mounting(k=1e12)
-
-
-def test_a_dead_load_does_its_work_in_a_snap():
-    """Driven by F = k w in place of w the tractions are the same, and so is what the snap releases."""
-    zone, loaded = ExponentialCohesiveZone(t_max=1e6, g_0=1e-6, E_n=1e13), {"w_n": Hold(level=0.0)}
-    runs = [
-        closed(together([zone], loading=loading, normal=Mounting(k=1e11)), 30.0)
-        for loading in (PULLED, loaded | {"F_n": Ramp(rate=1e5)})
-    ]
-    (first,), (second,) = (run.of("snap") for run in runs)
-    assert second.released == pytest.approx(first.released, rel=1e-9)
-    assert (first.verdict, second.verdict) == ("admissible", "admissible")
 
 
 @pytest.mark.parametrize("J_c", [0.5, 2.0])
@@ -45,22 +31,6 @@ def test_a_rigid_interface_that_has_debonded_bears_no_tension():
     first, second = solve(together([BondEnergy(K_0=0.1)], **given, normal=STIFF), 6.0).of("debond")
     assert (first.t, second.t) == pytest.approx((1.0, 5.0), rel=1e-9)
     assert second.released == pytest.approx(0.0, abs=1e-9)
-
-
-def test_a_gap_in_equilibrium_follows_bonds_that_sliding_breaks():
-    """The slider has a mass, the gap has none: as the bonds and their stiffness go, it goes with them."""
-    E, w_n = 1e13, -1e-6
-    potentials = [NormalStiffness(E_n=varying(E, Linear(of="phi", slope=0.5, about=0.0))), BondEnergy(K_0=1.0)]
-    frictions, loading = [BondedCoulomb(mu=0.3, mu_b=0.6, mu_ub=0.5)], {"w_n": Hold(level=w_n), "w_t": Ramp(rate=1e-6)}
-    mounts = {"normal": STIFF, "tangential": Mounting(k=1e11, m=1e9, c_b=1e10)}
-    scene = together(potentials, frictions, loading, {"phi": 1.0}, [LinearAffinity(c_r=0.0)], **mounts)
-    trajectory = closed(scene, 10.0)
-    slip = trajectory.of("slip forward")[0]
-    gaps = [trajectory.state(slip, "g_n", side) for side in ("before", "after")]
-    np.testing.assert_allclose(gaps, [1e12 * w_n / (1e12 + 1.5 * E), 1e12 * w_n / (1e12 + E)], rtol=1e-12)
-    p = np.array(gaps) * np.array([1.5 * E, E])
-    stored = p**2 / 2 * (1 / 1e12 + 1 / np.array([1.5 * E, E]))
-    assert slip.released == pytest.approx(stored[0] - stored[1] - 0.5, rel=1e-9)
 
 
 def test_a_dead_shear_load_sticks_up_to_the_limit_and_ends_there():
@@ -139,16 +109,6 @@ def test_a_local_jump_that_destroys_entropy_may_be_refused():
     trajectory = run(violation="refuse").trajectory
     assert trajectory.status == "stopped"
     assert "debonds as its tensile strength is reached, which destroys entropy" in trajectory.reason
-
-
-def test_together_the_springs_pay():
-    trajectory = run(release="joint").trajectory
-    (jump,) = trajectory.jumps
-    states = [state.name for state in trajectory.model.system.states]
-    rises = dict(zip(states, jump.after.y - jump.before.y, strict=True))
-    assert [1.2 * rises["T_1"], 0.9 * rises["T_2"]] == pytest.approx([jump.released / 4, 3 * jump.released / 4])
-    assert jump.released == pytest.approx(SPRING + 16 - bonds(90), rel=1e-9)
-    assert jump.verdict == "admissible"
 
 
 def test_an_interface_without_heat_of_its_own_cannot_pay():

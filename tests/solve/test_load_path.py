@@ -2,17 +2,10 @@
 
 import numpy as np
 import pytest
-from scenes import bodies, together
-from solved import closed, solve
 
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
-from surfacechem.laws.free_energy import Penalty, TangentialStiffness
-from surfacechem.laws.friction import RateAndStateAging
-from surfacechem.laws.loading import Hold, Table
-from surfacechem.results.audit import audit
 from surfacechem.runs.simulation import Simulation
-from surfacechem.scene import Mounting
 
 OWN, LIBRARY = "radau", "lsoda"
 
@@ -95,19 +88,6 @@ def released(solution, name="load"):
 # -- normal gap
 
 
-@pytest.mark.parametrize(("k", "solver"), [(1e12, LIBRARY), (0.0, OWN)])
-def test_a_traction_that_jumps_moves_an_elastic_gap(k, solver):
-    text = normal_text(f"w_n: 0, {STEP}" if k else STEP, mount=f"k: {k:g}", solver=solver)
-    solution = solved(text if k else text.replace("mechanics: {normal: {k: 0}}\n", ""))
-    E = 3e12 + k
-    for t, F in ((0.5, 0.5e6), (1.5, 5e6), (3.0, 2e6), (4.0, -1e6)):
-        assert at(solution, "g_n", t) == pytest.approx(F / E, rel=1e-11)
-        assert at(solution, "t_n", t) == pytest.approx(3e12 * F / E, rel=1e-11)
-    assert events(solution) == [("load", 1.0)]
-    assert released(solution) == pytest.approx([(4e6) ** 2 / (2 * E)], rel=1e-11)
-    assert at(solution, "T", 4.0) == pytest.approx(300 + 8e12 / E / 20, rel=1e-12)
-
-
 def test_a_traction_beyond_the_strength_ends_the_run_where_it_jumps():
     zone = "exponential-cohesive-zone: {t_max: 3 MPa, g_0: 1 um, E_n: 3e13 Pa/m}"
     text = normal_text(STEP, zone, "k: 0").replace("mechanics: {normal: {k: 0}}\n", "")
@@ -118,29 +98,6 @@ def test_a_traction_beyond_the_strength_ends_the_run_where_it_jumps():
 
 
 JUMPS = "w_n: {table: {times: [0, 1, 1, 4], values: [0, 1 um, 5 um, 5 um]}}"
-
-
-@pytest.mark.parametrize(("F", "solver"), [(0.0, LIBRARY), (1e6, OWN)])
-def test_a_displacement_that_jumps_works_on_the_spring_before_the_gap_moves(F, solver):
-    both = f"{JUMPS}, F_n: {{table: {{times: [0, 1, 1, 2], values: [0, 0, {F}, {F}]}}}}"
-    solution = normal(both if F else JUMPS, solver=solver)
-    before, after, k, E = 1e6 / 4e12, (5e6 + F) / 4e12, 1e12, 3e12
-    assert at(solution, "g_n", 0.5) == pytest.approx(before / 2, rel=1e-11)
-    assert at(solution, "g_n", 4.0) == pytest.approx(after, rel=1e-11)
-    assert released(solution) == pytest.approx([(k + E) / 2 * (after - before) ** 2], rel=1e-11)
-    (jump,) = solution.trajectory.jumps
-    lift = k / 2 * ((5e-6 - before) ** 2 - (1e-6 - before) ** 2)
-    assert jump.work["W_n"] == pytest.approx(lift + F * (after - before), rel=1e-11)
-
-
-def test_a_displacement_that_jumps_sets_a_mass_in_motion():
-    loading = "w_n: {table: {times: [0, 1, 1, 4], values: [0, 0, 5 um, 5 um]}}"
-    solution = normal(loading, "normal-stiffness: {E_n: 0.75e9 Pa/m}", "k: 0.25e9, m: 1e9")
-    g, w = 5e-6 / 4, 1.0
-    for t in (1.5, 2.0, 3.5, 4.0):
-        assert at(solution, "g_n", t) == pytest.approx(g * (1 - np.cos(w * (t - 1))), rel=1e-8)
-    assert at(solution, "work_n", 4.0) == pytest.approx(0.125e9 * 25e-12, rel=1e-10)
-    assert released(solution) == [0.0]
 
 
 @pytest.mark.parametrize("F", [1e6, -9e6])
@@ -177,36 +134,6 @@ def test_what_slides_sticks_where_the_pressure_jumps_up(static, start, again, so
     for t, u in ((1.0, 0.0), (2.5, 0.125e-3), (3.5, 0.25e-3), (4.75, 0.25e-3), (6.0, 0.5e-3)):
         assert at(solution, "u_t", t) == pytest.approx(u, rel=1e-9, abs=1e-16)
         assert at(solution, "t_t", t) == pytest.approx(1e9 * (0.25e-3 * t - u), rel=1e-9)
-
-
-def test_a_debonding_that_raises_the_limit_lets_what_slides_stick():
-    text = """
-T_0: 300 K
-bodies:
-  a: {temperature: T, C: 100 J/m^2/K, stiffness: 1e12 Pa/m}
-  b: {temperature: T, C: 100 J/m^2/K}
-interface:
-  temperature: T
-  sites: 1e18 1/m^2
-  potential:
-    - bond-energy: {K_0: 1e-3 J/m^2}
-  limits:
-    - tensile-strength: {t_max: 1 MPa}
-  friction:
-    - mohr-coulomb: {mu: 0.5, t_n_max: 3 MPa}
-mechanics: {tangential: {k: 1e12 Pa/m}}
-loading: {w_n: {ramp: {rate: 1 um/s}}, w_t: {ramp: {rate: 1 um/s}}}
-initial: {T: 300 K, phi: 1}
-run: {until: 2 s}
-"""
-    solution = solved(text)
-    assert [name for name, _ in events(solution)] == ["slip forward", "debond", "slip forward"]
-    (jump,) = [jump for jump in solution.trajectory.jumps if jump.edge.name == "debond"]
-    assert jump.released == pytest.approx(0.4995, rel=1e-11)
-    assert jump.verdict == "admissible"
-    np.testing.assert_array_equal(jump.after.y[1], 0.0)
-    assert solution.trajectory.jumps[2].t == pytest.approx(1.5, rel=1e-12)
-    assert at(solution, "u_t", 2.0) == pytest.approx(0.5e-6, rel=1e-11)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -255,32 +182,6 @@ def test_an_elastic_gap_on_a_given_displacement_slips_where_the_pressure_falls()
 
 
 # -- what creeps, and what is late ------------------------------------------------------------------------------------
-
-LIGHT = bodies("T", "T", C_1=1.0, C_2=1.0)
-
-
-def test_what_creeps_is_carried_along():
-    """Tractions that jump move an elastic gap at once, and the age and velocity of its friction follow."""
-    k, E, levels = 1e9, 1e10, np.array([0.0, 1e3, 1.5e3, -2e3])
-    steps = Table(times=[0.0, 10.0, 10.0, 20.0, 20.0, 30.0, 30.0, 40.0], values=levels.repeat(2).tolist())
-    friction = RateAndStateAging(mu_0=0.6, a=0.008, b=0.014, L=5e-6, v_0=1e-6)
-    loading = {"p": Hold(level=1e6), "w_t": Hold(level=0.0), "F_t": steps}
-    given = {"initial": {"theta": 1.0}, "pair": LIGHT, "tangential": Mounting(k=k)}
-    found = closed(together([TangentialStiffness(E_t=E)], [friction], loading, **given), 40.0, outputs=9)
-    u, theta, t_t, v = (found.everywhere(name)[1:9:2] for name in ("u_t", "theta", "t_t", "v"))
-    np.testing.assert_allclose(u, levels / (k + E), rtol=1e-12)
-    strength = (0.6 + 0.014 * np.log(1e-6 / 5e-6 * theta)) / 0.008
-    np.testing.assert_allclose(v, 2e-6 * np.sinh(t_t / 8e3) * np.exp(-strength), rtol=1e-11)
-
-
-@pytest.mark.parametrize("begin", [0.0, 14.584101652239939])
-def test_a_late_pulse_is_as_sharp_as_an_early_one(begin):
-    """One digit of the time is up to a millionth of the pulse; in a time of its own nothing is lost in it."""
-    pulse = Table(times=(begin + np.array([0.0, 1e-9, 2e-9])).tolist(), values=[0.0, -1e9, 0.0])
-    loading = {"w_n": Hold(level=0.0), "F_n": pulse}
-    books = audit(solve(together([Penalty(E_n=1e15)], loading=loading, pair=LIGHT, normal=Mounting(k=1e9)), 40.0))
-    assert books.energy_scale == pytest.approx(0.5 * 1e18 / 1e15, rel=1e-5)
-    assert books.energy_error < 1e-11
 
 
 def test_a_gap_that_snaps_off_does_not_pull_back_what_is_dragged():

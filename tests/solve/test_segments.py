@@ -9,8 +9,8 @@ from solved import solve
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.laws.friction import Coulomb, MohrCoulomb
-from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.laws.friction import Coulomb
+from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat
 from surfacechem.results.event_table import event_columns
 
@@ -67,14 +67,6 @@ def test_a_pressure_that_touches_nothing_goes_on(solved, size, phase):
     assert float(data.dataset["T"][-1]) == pytest.approx(np.sqrt(300.0**2 + heat * 600.0 / 2000.0), rel=1e-12)
 
 
-def test_a_balance_in_which_nothing_is_exchanged_is_closed(solved):
-    mount = "mechanics: {normal: {k: 1e12}}\nloading: {w_n: 0, F_n: -5 MPa}\n"
-    solution = solved(CASE + "  potential: [normal-stiffness: {E_n: 3e12}]\n" + mount + END)
-    assert solution.warnings == ()
-    assert solution.audit.energy_error < 1e-12
-    assert solution.audit.entropy_error < 1e-12
-
-
 def test_a_stage_waits_for_the_traction_along_the_interface(solved):
     stages = """
 mechanics: {tangential: {k: 1e9}}
@@ -116,15 +108,6 @@ def test_a_gap_that_a_law_excludes_at_the_start_is_to_be_given(solved):
     assert solved(CASE + law + mount + given).status == "finished"
 
 
-def test_friction_under_a_prescribed_gap_heats_while_it_is_closed(solved):
-    """Three cycles of a gap that is closed for half of each, by quadratic energies."""
-    gap = "loading: {v: 1 mm/s, g_n: {harmonic: {amplitude: 1 um, frequency: 1.5 Hz, phase: 0.5 rad}}}\n"
-    solution = solved(PENALTY + "  friction: [coulomb: {mu: 0.5}]\n" + gap + END)
-    heat = 0.5 * 1e6 * 1e-3 * 2 / (3 * np.pi) * 3
-    assert float(solution.dataset["T"][-1]) == pytest.approx(np.sqrt(300.0**2 + heat * 600.0 / 2000.0), rel=1e-13)
-    assert solution.audit.energy_error < 1e-9
-
-
 # -- kinks that fall on breakpoints of the loading are events like any other, once each -------------------------------
 
 
@@ -134,19 +117,6 @@ RUBBING, SWINGS = [Coulomb(mu=0.3)], {"v": Harmonic(amplitude=1e-3, frequency=0.
 def reversals(trajectory, name="v"):
     columns = {column.name: column.values for column in event_columns([trajectory])}
     return columns["event_time"][columns["event_name"] == name]
-
-
-@pytest.mark.parametrize(("breaks", "solver"), [([], "lsoda"), ([1.0], "radau"), ([0.7, 2.0, 3.0], "lsoda")])
-def test_a_velocity_reverses_at_breakpoints_of_another_load(breaks, solver):
-    pressure = Table(times=[0.0, *breaks, 4.0], values=[1e5 * (1 + k % 2) for k in range(2 + len(breaks))])
-    trajectory = solve(together((), RUBBING, {"p": pressure, **SWINGS}), 4.0, solver=solver)
-    np.testing.assert_allclose(reversals(trajectory), [1.0, 2.0, 3.0], rtol=0, atol=1e-13)
-
-
-def test_a_velocity_reverses_at_a_breakpoint_of_its_own():
-    """Before it the table leaves a rounding of the velocity, after it none."""
-    loading = {"p": Hold(level=1e5), "v": Table(times=[0.0, 0.7, 1.4, 4.0], values=[1.7e-3, 0.0, -1e-3, 1.6e-3])}
-    np.testing.assert_allclose(reversals(solve(together((), RUBBING, loading), 4.0, solver="lsoda")), [0.7, 2.4])
 
 
 def test_a_step_ends_where_a_given_gap_closes():
@@ -166,13 +136,3 @@ def test_kinks_at_one_moment_are_events_once_each():
     turns = [(k * math.pi - 0.3) / (2 * math.pi * 0.37) for k in range(1, 5)]
     for name in ("v", "v_2"):
         np.testing.assert_allclose(reversals(trajectory, name), turns, rtol=1e-13)
-
-
-def test_a_run_ends_where_tension_reaches_the_strength():
-    """Friction of Mohr and Coulomb falls with the pressure to p = -t_n_max, beyond which no contact bears it."""
-    loading = {"p": Ramp(start=1e5, rate=-1e5), "v": Hold(level=1e-3)}
-    trajectory = solve(together((), [MohrCoulomb(mu=0.3, t_n_max=5e4)], loading), 4.0, rtol=1e-9)
-    assert trajectory.status == "stopped"
-    assert trajectory.reason.startswith("p fell below -t_n_max, where the law mohr-coulomb ends")
-    assert trajectory.result.t == pytest.approx(1.5, rel=1e-9)
-    assert trajectory.booked("W_mohr_coulomb") == pytest.approx(0.3 * 1e-3 * 1.5e5 * 1.5 / 2, rel=1e-10)
