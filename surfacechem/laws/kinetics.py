@@ -97,8 +97,9 @@ class Relaxation(RateLaw):
     .. math:: R = -\frac{n_c}{\tau} \frac{\mu}{\partial \mu / \partial \phi}
 
     With a quadratic bond energy :math:`\dot\phi = (\phi_{eq} - \phi) / \tau` at any temperature: the linear law with
-    :math:`c_r = n_c / (\tau K(T))`. Source: Sauer, Duong & Mandadapu (2021), eq. e:dphi_ex with constant tau.
-    Admissible while the potential is convex in phi.
+    :math:`c_r = n_c / (\tau K(T))`. With ideal mixing it is the logarithm of :math:`\phi / (1 - \phi)` that relaxes,
+    so that no bond at all, and complete bonding, are at rest. Source: Sauer, Duong & Mandadapu (2021), eq. e:dphi_ex
+    with constant tau. Admissible while the potential is convex in phi.
 
     >>> Relaxation(tau=0.5).rate(mu=-0.5, dmu_dphi=0.25, n_c=3.0)
     12.0
@@ -250,10 +251,8 @@ class BondRates(RateLaw):
     def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
         """Logarithms of the coefficients of formation and rupture."""
         numbers = vars(self)
-        return (
-            log_fraction(numbers["k_on"]) + self.log_on(f, T_c),
-            log_fraction(numbers[self.off]) + self.log_off(f, T_c),
-        )
+        on, off = log_fraction(numbers["k_on"]), log_fraction(numbers[self.off])
+        return on + self.log_on(f, T_c), off + self.log_off(f, T_c)
 
     @property
     def log_ratio(self) -> Callable[..., Expression] | None:

@@ -127,10 +127,8 @@ def _choose_sides(
             _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
         if near[-1]:
             return
-    last, (close, far) = (
-        np.array([values[-1] for values in exact.values()]),
-        np.reshape([*before_end.values()], (-1, 2)).T,
-    )
+    last = np.array([values[-1] for values in exact.values()])
+    close, far = np.reshape([*before_end.values()], (-1, 2)).T
     jumped = np.abs(last - close) > JUMP_RATIO * np.abs(close - far) + EQUAL * np.abs(close)
     if jumped.any():
         others = {name: close[k : k + 1] for k, name in enumerate(before_end) if jumped[k]}

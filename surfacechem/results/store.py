@@ -324,10 +324,8 @@ def _make(path: Path, layout: Layout) -> None:
     for name, item in {**layout.variables, **layout.unchunked}.items():
         shape = tuple(layout.sizes[dimension] for dimension in item.dimensions)
         part = (*layout.chunk, *shape[len(layout.chunk) :]) if name in layout.variables else shape
-        packed = {
-            "compressors": zarr.codecs.ZstdCodec(level=COMPRESSION),
-            "fill_value": MISSING[np.dtype(item.kind).kind],
-        }
+        missing = MISSING[np.dtype(item.kind).kind]
+        packed = {"compressors": zarr.codecs.ZstdCodec(level=COMPRESSION), "fill_value": missing}
         named = {"dimension_names": item.dimensions, "attributes": dict(item.attributes)}
         group.create_array(name, shape=shape, chunks=part, dtype=item.kind, **packed, **named)
     for column in layout.coordinates:

@@ -74,11 +74,8 @@ def termination(
     algebraic = [state for state in system.states if state.algebraic]
     if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
         return "stopped", f"{_unbalanced(system, algebraic, inputs)} at {where}"
-    ends = filter(
-        None,
-        (hidden(system.states, result), runaway(system.states, result), beyond_numbers(system, result, inputs, named)),
-    )
-    if (end := next(ends, None)) is not None:
+    end = hidden(system.states, result) or runaway(system.states, result)
+    if end := end or beyond_numbers(system, result, inputs, named):
         return "stopped", f"{end} near {where}"
     cause = too_fast(system, result, values) or swiftest(system.states, result)
     return "failed", f"{REASONS[result.status]} at {where}{_spent(result)}{cause}"

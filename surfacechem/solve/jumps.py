@@ -299,12 +299,8 @@ class Jumper:
     def ledger_change(self, jump: Jump) -> Array:
         """Return the amounts that a jump adds to the accounts of the ledger."""
         changes = jump.after.y - jump.before.y
-        sums = {
-            RELEASED: jump.released,
-            PRODUCED: jump.entropy,
-            HEAT_OUT: -jump.heat_out,
-            ENTROPY_OUT: -jump.entropy_out,
-        }
+        sums = {RELEASED: jump.released, PRODUCED: jump.entropy}
+        sums |= {HEAT_OUT: -jump.heat_out, ENTROPY_OUT: -jump.entropy_out}
         amounts = []
         for account, (kind, place) in zip(self.system.ledger, self._accounts, strict=True):
             # Jumping loads, and the last part before a fold, do work on other accounts too.

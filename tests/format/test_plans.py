@@ -10,16 +10,7 @@ from scipy import stats
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.format.plans import (
-    SAMPLERS,
-    Axis,
-    Distribution,
-    EvenlySpaced,
-    Plan,
-    Sample,
-    permuted,
-    recorded_plan,
-)
+from surfacechem.format.plans import SAMPLERS, Axis, Distribution, EvenlySpaced, Plan, Sample, permuted, recorded_plan
 
 K_0, C_R = "interface.potential.bond-energy.K_0", "interface.bonding.linear-affinity.c_r"
 LAWS = {

@@ -221,10 +221,8 @@ run: {until: 9 s}
 @pytest.mark.parametrize("after", [1000, 1])
 def test_levels_and_extremes_are_met_where_loads_step_too(after, tmp_path):
     """In arrays, one run at a time, and at the times that runs share, which lie on both sides of the step."""
-    text, over = (
-        STEPPED % [f"{v} mm/s" for v in (1, 1, 1000, after, after)],
-        {"interface.friction.coulomb.mu": [0.1, 0.3]},
-    )
+    text = STEPPED % [f"{v} mm/s" for v in (1, 1, 1000, after, after)]
+    over = {"interface.friction.coulomb.mu": [0.1, 0.3]}
     for k, more in enumerate(({}, {"run.max-seconds": 1000})):
         keep = {"max": ["v", "D_coulomb"], "reach": {"v": "0.5 m/s"}}
         simulation = surfacechem.load(text, {"sweep": {"over": over, "keep": keep}, **more})

@@ -64,10 +64,8 @@ def laws(build: Build) -> Iterator[Margin]:
             name = role.variable.removeprefix("f_") if role.variable != "f" else "phi"
             carriers.append((name, build.bonding[name].symbol))
     for name, bonds in carriers:
-        losses = (
-            derivative(bonds, b.symbol) * build.rows[other].subs({b.dot: 0}) for other, b in build.bonding.items()
-        )
-        loss = symengine.Add(*losses)
+        rates = ((b.symbol, build.rows[other].subs({b.dot: 0})) for other, b in build.bonding.items())
+        loss = symengine.Add(*(derivative(bonds, symbol) * rate for symbol, rate in rates))
         if loss != 0:
             # Bonds that would be gone within the roundoff of the elapsed time have ruptured.
             left = bonds - TIME_EPS * (build.t + ZERO_TIME) * loss + NO_AMOUNT

@@ -47,9 +47,8 @@ def variables(build: Build) -> Iterator[Constraint | Margin | State]:
         yield from _moving(build, mount)
         # A law whose domain is an open gap ends the run as the gap closes, so it needs no contact.
         if meets and not any("g_n" in law.positive for law in (*build.interface.frictions, *build.scene.heat)):
-            closed = contact(
-                far_field(build, mount).force(ZERO, ZERO), _bonded(build), G, V if mount.inertial else None
-            )
+            pull = far_field(build, mount).force(ZERO, ZERO)
+            closed = contact(pull, _bonded(build), G, V if mount.inertial else None)
             yield closed
             if mount.inertial:
                 build.motion.gap_rates["g_n"] = closed.active * V

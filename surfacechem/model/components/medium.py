@@ -194,11 +194,9 @@ class FluidFit:
             self.ranges.add((low, high))
             span = self.fluid.range(self.start)
             fitted = f"the properties of {self.fluid.name} are fitted no further ({RANGE_REMEDY})"
-            beyond = (
-                span.reason_low if low == span.low else fitted,
-                span.reason_high if high == span.high else fitted,
-            )
-            margins = (self.T - ends[0], low, beyond[0]), (ends[-1] - self.T, high, beyond[1])
+            below = span.reason_low if low == span.low else fitted
+            above = span.reason_high if high == span.high else fitted
+            margins = (self.T - ends[0], low, below), (ends[-1] - self.T, high, above)
             for margin, end, reason in margins:
                 name = f"{self.T} within the range of the fluid"
                 self.build.add(Margin(name, margin, f"{reason} at {self.T} = {end:.6g} K"))

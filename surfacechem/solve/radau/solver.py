@@ -236,11 +236,8 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
     for row, each in zip(times, problems, strict=True):
         row[: len(each.times)] = each.times
     segments = shared([each.segments for each in problems])
-    columns, max_steps = (
-        (y0, parameters, spacing, peaks, segments, shared(times)),
-        [each.max_steps for each in problems],
-    )
-    batch = batch_of(problems[0], columns, max_steps=max_steps)
+    columns = y0, parameters, spacing, peaks, segments, shared(times)
+    batch = batch_of(problems[0], columns, max_steps=[each.max_steps for each in problems])
     stepper.run(batch)
     return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
 
