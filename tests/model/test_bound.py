@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scenes import SITES, bodies, together, varying
 from scipy.optimize import brentq
+from scipy.special import expit, logit
 from solved import closed
 from zoo import pairwise
 
@@ -29,6 +30,7 @@ from surfacechem.laws.kinetics import (
     KamalSourour,
     LinearAffinity,
     MassAction,
+    Relaxation,
     ReversibleBell,
 )
 from surfacechem.laws.loading import Hold, Table
@@ -120,6 +122,15 @@ def test_bonds_too_strong_for_an_equilibrium_below_the_bound_are_complete(epsilo
     assert trajectory.result.outputs[1:, 0].tolist() == [bound, bound]
     assert Solution(trajectory).audit.findings == ()
     assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
+
+
+@pytest.mark.parametrize(("phi", "rest"), [(0.0, 1.0), (1e-280, 1.0), (1.0, 1.0), (0.5, -483.0), (0.5, 483.0)])
+def test_relaxation_to_ideal_mixing_is_that_of_its_logarithm(phi, rest):
+    """From any number of bonds to any other; none at all, or all of them, are at rest, which is said."""
+    mixing = LatticeGas(epsilon=rest * 1.380649e-23 * 300.0)
+    run = closed(isothermal(Relaxation(tau=1.0), phi=phi, potentials=[mixing]), 6.5)
+    assert run.end("phi") == pytest.approx(expit(rest + (logit(phi) - rest) * math.exp(-6.5)), rel=1e-9, abs=1e-16)
+    assert (phi in (0, 1)) == any("does not leave a bound" in text for text in Solution(run.trajectory).warnings)
 
 
 def test_a_bound_that_only_a_branch_of_the_rate_passes():

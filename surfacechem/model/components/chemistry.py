@@ -20,7 +20,7 @@ from surfacechem.model.build import Build
 from surfacechem.model.components.force import SHARED_LOAD
 from surfacechem.model.components.mounting import law_reads
 from surfacechem.model.components.pairs import Opposed, by_affinity, dead_load, departure, opposed, own_departure
-from surfacechem.model.constraints.bound import bound
+from surfacechem.model.constraints.bound import bending, bound
 from surfacechem.model.constraints.envelope import softening
 from surfacechem.model.constraints.unilateral import TOUCH_OVERLAP
 from surfacechem.model.system import Account, CappedLaw, Caution, Margin, RatePair
@@ -128,7 +128,7 @@ def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
     """Return the reactions with their net rates as named quantities."""
     laws = {item.label: item.law for item in found if item.law.envelope is None}
     stated = {item.label: _rate(build, item.law, item.affinity) for item in found if item.label in laws}
-    rates = stated | {label: _resolved(build, laws, stated, label) for label in _loaded(build, stated)}
+    rates = {label: _resolved(build, laws, stated, label) for label in stated}
     forming = symengine.Add(*(law.stoichiometry().get("phi", 0) * rates[label] for label, law in laws.items()))
     # One while the bonding state may change; zero at a bound and while debonded. Laws without an envelope could carry
     # it over a bound; a law with an envelope ends there.
@@ -167,10 +167,10 @@ def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> Iterato
 
 
 def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
-    own = {"mu": affinity, "t": build.t}
-    if "phi" in build.bonding:
-        bond = build.bonding["phi"]
-        own["dmu_dphi"] = derivative(derivative(build.psi, bond.symbol), bond.symbol) / bond.density
+    own, room = {"mu": affinity, "t": build.t}, symengine.Integer(1)
+    if law_reads(law, "dmu_dphi") and "phi" in build.bonding:
+        bends, room = bending(build, law, affinity)
+        own["dmu_dphi"] = bends / room
     for name in law.positive:  # a law that divides by an expression that is zero in this scene does not apply
         value = symengine.sympify(own[name] if name in own else build.variables.get(name, law))
         if value.is_Number and not value > 0:
@@ -179,7 +179,7 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
                 law.place,
             )
     rate = build.variables.call(law, law.statement, own)
-    build.law_margins(law, own)
+    build.law_margins(law, own | {"dmu_dphi": own.get("dmu_dphi", 0) * room})
     if law_reads(law, "f") and not depends(rate, symengine.Symbol("f")):
         unset = ", ".join(name for name, _ in law.specs() if vars(law)[name] == 0)
         build.add(f"{law.title} reads the force on bonds, but does not depend on it: without a value are {unset}.")
@@ -188,19 +188,16 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     return rate
 
 
-def _loaded(build: Build, rates: Mapping[str, Expression]) -> list[str]:
-    """Return the labels of the rates whose exponents read a load."""
-    loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
-    return [label for label, rate in rates.items() if any(loads & item.free_symbols for item in exponents(rate))]
-
-
 def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], label: str) -> Expression:
-    """Limit a rate under load, in both directions alike, to the fastest relaxation that time resolves.
+    """Limit a rate whose exponents read a load, in both directions alike, to the fastest relaxation that time resolves.
 
     It then still relaxes at once, and far faster than all other reactions of the same species, so that the partition of
     the species between reactions does not depend on the limit.
     """
     law, rate = laws[label], rates[label]
+    loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
+    if not any(loads & item.free_symbols for item in exponents(rate)):
+        return rate
     if any(role.by == SHARED_LOAD and build.variables.was_read(role.variable) for role in build.variables.roles):
         return rate  # bonds that share a load rupture first, which ends the run
     own = law.stoichiometry()

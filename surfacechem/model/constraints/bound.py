@@ -18,13 +18,14 @@ from typing import Any
 
 import symengine
 
-from surfacechem.contracts.terms import reads
-from surfacechem.expressions import Expression, magnitude, where
+from surfacechem.contracts.terms import RateLaw, reads
+from surfacechem.expressions import Expression, derivative, magnitude, where
 from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.build import Build
 from surfacechem.model.components.interface import LN_PHI
+from surfacechem.model.system import Caution
 from surfacechem.quantities import Quantity
-from surfacechem.tolerances import BOUND_EPS, EPS
+from surfacechem.tolerances import BOUND_EPS, EPS, FRACTION_FLOOR, LEAST_COVERAGE
 
 NOT_NUMBERS = type(symengine.zoo), type(symengine.nan), type(symengine.oo)
 
@@ -65,6 +66,30 @@ def bound(build: Build, rate: Expression) -> Constraint:
     return Constraint((mode,), edges=tuple(edges), active=1 - held**2, resets=breaking)
 
 
+def bending(build: Build, law: RateLaw, mu: Expression) -> tuple[Expression, Expression]:
+    """Return the derivative of the chemical potential by the bonding state as a numerator and a denominator.
+
+    The denominator alone is zero where ideal mixing bends without bound: where no bond, or no free site, is left. Both
+    have finite derivatives, unlike the quotient and its inverse. A law of this derivative relaxes the logarithm of phi,
+    so that any number of bonds next to none is resolved; where it stays at a bound a caution is given.
+    """
+    zero, under = symengine.Integer(0), symengine.Integer(1)
+    bends = derivative(derivative(build.psi, PHI), PHI) / build.bonding["phi"].density
+    poles = {p: p.args[1] for p in bends.atoms(symengine.Piecewise) if p.args[1].args[0] == FRACTION_FLOOR}
+    over = rest = bends.xreplace(dict.fromkeys(poles, zero))
+    for pole, condition in sorted(poles.items(), key=str):
+        fraction = condition.args[1]
+        residue = bends.xreplace({**dict.fromkeys(poles, zero), pole: pole.args[0] * fraction}) - rest
+        side = where(condition, fraction, 0)
+        over, under = over * side + under * residue, under * side
+    if poles:
+        build.states[:] = [replace(s, finest=LEAST_COVERAGE) if s.symbol == PHI else s for s in build.states]
+        low, high = (build.expanded(mu).subs({PHI: inside}) for _, _, inside, *_ in BOUNDS)
+        text = f"{law.title} does not leave a bound of phi, where ideal mixing bends without bound: start beside it"
+        build.add(Caution(where(under > 0, 1, where(PHI > PHI_MAX / 2, -high, low)), text))
+    return over, under
+
+
 def _may_leave_the_range(build: Build) -> bool:
     """True if a law without an envelope may carry the bonding state out of its range."""
     top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
@@ -97,14 +122,15 @@ def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression,
     phi = next((phi for phi in (at, inside) if not _is_singular(whole, phi, numbers)), None)
     if phi is None:
         return rate
-    if whole.subs({PHI: phi}) == 0:
+    rests = phi is inside and whole.subs({PHI: at}).subs({PHI_MAX: numbers[PHI_MAX]}).is_zero
+    if rests or whole.subs({PHI: phi}) == 0:
         return symengine.Integer(0)
     # The quantities that the rate reads, directly or through others, are named at the bound too, so that common
     # subexpressions stay common there.
-    needed = {str(symbol) for symbol in rate.free_symbols}
+    needed = set(map(str, rate.free_symbols))
     for item in reversed(build.named):
         if item.name in needed:
-            needed |= {str(symbol) for symbol in symengine.sympify(item.expression).free_symbols}
+            needed.update(map(str, symengine.sympify(item.expression).free_symbols))
     put: dict[Any, Expression] = {PHI: phi}
     for item in [item for item in build.named if item.name in needed]:
         value = symengine.sympify(item.expression).subs(put)
