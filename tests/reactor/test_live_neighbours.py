@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import InterfaceReactor, ReactingGas, ReactingGasAtPressure, ReactingSolid, ReactorNet
@@ -80,66 +79,6 @@ def test_mass_elements_and_energy_stay_what_they_are(kind, held):
     assert data["production_H2O"].values[0] == pytest.approx(made[0], rel=1e-2)
 
 
-def test_at_constant_temperature_as_cantera_s_own_surface():
-    gas, theirs = fuel(energy="off"), fuel(ct.IdealGasReactor, energy="off")
-    interface = InterfaceReactor(HELD, neighbours={"gas": gas}, area=AREA)
-    surface = ct.Interface("sofc.yaml", "metal_surface")
-    surface.TP = 1000, ct.one_atm
-    surface.coverages = "(m):1"
-    beside = ct.ReactorSurface(surface, theirs, A=AREA, clone=True)
-    ours, alone = network(interface, gas), ct.ReactorNet([theirs])
-    alone.rtol, alone.atol = 1e-10, 1e-18
-    for t in (1e-8, 1e-6, 1e-4):
-        ours.advance(t)
-        alone.advance(t)
-        np.testing.assert_allclose(gas.phase.X, theirs.phase.X, atol=1e-8)
-        np.testing.assert_allclose([interface[name] for name in interface.scene.states], beside.coverages, atol=1e-8)
-        assert gas.mass == pytest.approx(theirs.mass, rel=1e-9)
-    assert np.abs(gas.phase.X - fuel().phase.X).max() > 0.1
-
-
-def test_two_halves_of_a_case_beside_one_gas_are_the_whole():
-    whole, shared = fuel(), fuel()
-    one = InterfaceReactor(WARM, neighbours={"gas": whole}, area=AREA)
-    case = surfacechem.load(WARM).case
-    halves = [InterfaceReactor(case, area=AREA / 2, neighbours={"gas": shared}, name=name) for name in "ab"]
-    network(whole, one).advance(1e-4)
-    network(shared, *halves).advance(1e-4)
-    np.testing.assert_allclose(shared.phase.X, whole.phase.X, atol=1e-8)
-    for half in halves:
-        np.testing.assert_allclose(half.T, one.T, rtol=1e-8)
-
-
-def test_a_reservoir_is_a_neighbour_that_stays_as_it_is():
-    gas = ct.Solution("sofc.yaml", "gas")
-    gas.TPX = 1000, ct.one_atm, FUEL
-    interface = InterfaceReactor(HELD, neighbours={"gas": ct.Reservoir(gas, clone=True)})
-    network(interface).advance(1e-5)
-    held = InterfaceReactor(HELD)
-    network(held).advance(1e-5)
-    count = len(held.scene.states)
-    np.testing.assert_allclose(interface.x[:count], held.x[:count], atol=1e-9)
-
-
-def test_sensitivity_of_the_gas_to_a_reaction_of_the_surface():
-    """Against the change by another rate: what the gas receives feels the multiplier."""
-
-    def water(multiplier, wanted):
-        gas = fuel(energy="off")
-        interface = InterfaceReactor(HELD, neighbours={"gas": gas}, area=AREA)
-        net = network(interface, gas)
-        interface.phase.set_multiplier(multiplier, 1)
-        if wanted:
-            interface.add_sensitivity_reaction(1)
-            net.rtol_sensitivity = net.atol_sensitivity = 1e-6
-        net.advance(1e-6)
-        return gas.phase["O2"].Y[0], net.sensitivity("O2", 0, 1) if wanted else None
-
-    (more, _), (less, _), (_, found) = water(1.01, False), water(0.99, False), water(1.0, True)
-    assert abs(found) > 1e-3
-    assert found == pytest.approx((np.log(more) - np.log(less)) / (np.log(1.01) - np.log(0.99)), rel=1e-3)
-
-
 @pytest.mark.parametrize(("kind", "error"), [(ReactorNet, InputError), (ct.ReactorNet, ct.CanteraError)])
 def test_a_gas_that_asks_before_rates_are_varied(kind, error):
     gas = fuel()
@@ -148,42 +87,6 @@ def test_a_gas_that_asks_before_rates_are_varied(kind, error):
     interface.add_sensitivity_reaction(1)
     with pytest.raises(error, match="Give interface to the network before the reactors that take from it"):
         net.advance(1e-6)
-
-
-@pytest.mark.parametrize("stepwise", [False, True])
-def test_an_area_that_changes_while_the_network_runs(stepwise):
-    """The gas loses what the surface takes, as with a network that starts there."""
-    gas = fuel()
-    interface = InterfaceReactor(WARM, neighbours={"gas": gas}, area=AREA)
-    net = network(gas, interface)
-
-    def energies():
-        return np.array([gas.mass * gas.phase.int_energy_mass, interface["E_total"]])
-
-    net.advance(1e-6)
-    before = energies()
-    interface.area = 3 * AREA
-    while net.time < 1e-5:
-        net.step() if stepwise else net.advance(1e-5)
-    lost, taken = energies() - before
-    assert 3 * AREA * taken == pytest.approx(-lost, rel=1e-6)
-
-
-def test_accounts_by_steps_are_those_at_once():
-    """Also from the very start, where one step of the integrator is looked at after the other; sites are exact."""
-    found = []
-    for stepwise in (True, False):
-        interface = InterfaceReactor(WARM, neighbours={"gas": (gas := fuel())}, area=AREA)
-        net = ReactorNet([gas, interface])
-        net.rtol, net.atol = 1e-9, 1e-16
-        while stepwise and net.time < 1e-5:
-            net.step()
-        net.advance(2e-5)
-        data = interface.dataset
-        found.append([float(data[account][-1]) for account in ("entropy_R1", "heat_R3", "H_neighbours")])
-        assert data.attrs["entropy_error"] < 1e-6
-        assert data.attrs["site_error"] < 1e-12
-    assert found[0] == pytest.approx(found[1], rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -319,42 +222,6 @@ def test_a_particle_is_used_up(volts, rest):
 
 
 CHARGED = ELECTRODE.replace("-3.2 V", "-2.9 V, capacitance: 20 uF/cm^2")
-
-
-def test_two_electrodes_of_a_cell_discharge_through_a_resistor():
-    """What charge the double layers gain, lithium has brought; at rest they are at one potential."""
-
-    phases = [ct.Solution("lithium_ion_battery.yaml", name) for name in ("anode", "cathode", "electrolyte")]
-    for phase, parts in zip(phases, ((0.7, 0.3), (0.4, 0.6), (0.48, 0.37, 0.08, 0.07)), strict=True):
-        phase.TPX = 300, ct.one_atm, parts
-    solids = [ReactingSolid(phase, mass="20 mg", name=phase.name) for phase in phases]
-    anode, cathode = (
-        InterfaceReactor(
-            CHARGED.replace("anode", solid.name).replace("-2.9 V", volts),
-            area=area,
-            neighbours={solid.name: solid, "electrolyte": solids[2]},
-        )
-        for solid, volts, area in zip(solids, ("-2.9 V", "1 V"), (1.0, 2.0), strict=False)
-    )
-
-    def current(_):
-        return (cathode["V_electron"] - anode["V_electron"]) / 2.0
-
-    def charge():
-        return sum(0.2 * each.area * each["V_electron"] for each in (anode, cathode))
-
-    anode.load("j_electron", lambda t: current(t) / anode.area)
-    cathode.load("j_electron", lambda t: -current(t) / cathode.area)
-    net = network(anode, cathode, *solids)
-    net.rtol = 1e-6
-    before, lithium = charge(), [solid.amounts[k] for solid, k in zip(solids, (0, 0, 2), strict=True)]
-    net.advance(1.0)
-    assert anode["i_electron"] == pytest.approx(-current(1.0), rel=1e-2)
-    dissolved = solids[2].amounts[2] - lithium[2]
-    assert charge() - before == pytest.approx(-dissolved * ct.faraday, rel=1e-7)
-    net.advance(100.0)
-    assert current(100.0) == pytest.approx(0, abs=net.rtol / 2)  # potentials of 1 V by 2 ohm
-    assert solids[0].amounts[0] + solids[1].amounts[0] + solids[2].amounts[2] == pytest.approx(sum(lithium), rel=1e-12)
 
 
 def test_particles_of_one_phase_have_each_their_own():

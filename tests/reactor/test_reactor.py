@@ -71,13 +71,6 @@ def test_same_trajectory_as_a_run(name):
     assert interface.seconds_per_rate > 0
 
 
-def test_the_dataset_of_curved_surfaces():
-    interface, net = network("ball-in-a-socket")
-    net.advance(1e-7)
-    run = surfacechem.load("ball-in-a-socket", ["run.until=1e-7 s"]).run(error="balances")
-    assert set(run.dataset.variables) == set(interface.dataset.variables)
-
-
 PULSE = """
 bodies:
   lower: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
@@ -312,20 +305,6 @@ def test_a_stirred_gas_as_the_second_body(warm):
     assert dataset.attrs["case"] == ""
 
 
-def test_a_wall_on_the_other_body_leaves_the_heat_of_the_stirred_gas(warm):
-    """It adds lines to the ledger, before that of the heat that the gas gives; and the area is set later."""
-    gas, oven = stirred(350.0), stirred(400.0)
-    interface = InterfaceReactor(warm, area=0.1, bodies={"upper": gas})
-    ct.Wall(oven, interface.body("lower"), A=0.7, U=10.0)
-    interface.area = 0.7
-    net = ReactorNet([gas, oven, interface])
-    net.rtol = RTOL
-    before = interface["E_total"] * interface.area + energy(gas) + energy(oven)
-    net.advance(5.0)
-    assert interface["E_total"] * interface.area + energy(gas) + energy(oven) == pytest.approx(before, abs=1e-3)
-    assert gas.T < 349
-
-
 def test_heat_through_a_wall():
     """A body and a gas of constant capacity behind a wall: the difference decays exponentially."""
     case = (
@@ -438,17 +417,6 @@ def test_connectors_that_would_lose_something_are_refused_and_carry_nothing(conn
     assert (gas.mass, gas.phase.int_energy_mass) == pytest.approx(before, rel=1e-12)
 
 
-def test_overrides_stand_second_as_in_load():
-    assert InterfaceReactor("dna-adhesive", ["initial.T_1=350 K"])["T_1"] == 350.0
-
-
-@pytest.mark.parametrize(("case", "name"), [("dna-adhesive", "T_c"), ("exothermic", "T"), ("one-sided-contact", "T_1")])
-def test_the_temperature_is_that_of_the_interface(case, name):
-    interface, net = network(case)
-    net.advance(0.5)
-    assert interface.T == interface[name] != 298.15
-
-
 @pytest.mark.parametrize("kind", [ReactorNet, ct.ReactorNet])
 def test_advance_limits_count_from_where_the_user_starts(kind):
     variable, limit = "T", 5.0
@@ -475,25 +443,6 @@ def test_a_network_may_begin_at_any_time(kind):
     assert later.x == pytest.approx(at_once.x, rel=LOOSE)
 
 
-@pytest.mark.parametrize("end", [0.0, 0.5])
-def test_a_network_may_begin_before_zero(end):
-    later, at_once = (InterfaceReactor("dna-adhesive") for _ in range(2))
-    for interface, start in ((later, -1.0), (at_once, 0.0)):
-        net = ReactorNet([interface])
-        net.rtol, net.initial_time = RTOL, start
-        net.advance(start + 1.0 + end)
-    assert later.x[:5] == pytest.approx(at_once.x[:5], rel=LOOSE)
-    assert list(later.dataset["time"].values) == [-1.0, end]
-
-
-def test_reactors_from_a_generator():
-    """Cantera uses it up."""
-    net = ReactorNet(InterfaceReactor(case) for case in ("stick-slip", "exothermic"))
-    net.advance(0.7)
-    assert [each.name for each in net.interfaces] == ["interface", "interface_2"]
-    assert len(net.interfaces[0].scene.events.instant.jumps) == 2
-
-
 @pytest.mark.parametrize("kind", [ReactorNet, ct.ReactorNet])
 @pytest.mark.parametrize("case", ["exothermic", "stick-slip"])
 def test_no_network_goes_back(kind, case):
@@ -511,38 +460,6 @@ def test_no_network_goes_back(kind, case):
 def test_a_time_that_is_no_finite_number_is_refused(t):
     with pytest.raises(InputError, match=f"advances to a finite time in s, not to {t!r}"):
         ReactorNet([InterfaceReactor("exothermic")]).advance(t)
-
-
-@pytest.mark.parametrize("t", [np.float32(1.5), np.array(1.5), 1.5])
-def test_a_time_of_any_kind_of_number(t):
-    net = ReactorNet([InterfaceReactor("debonding")])
-    net.advance(1.0)
-    assert net.advance(t) == 1.5
-
-
-def test_accounts_of_a_history_over_which_no_state_moves():
-    """The integrator passes over the whole history in a few steps; the network integrates what is exchanged."""
-    run, interface = surfacechem.load("lithium-polarisation").run(), InterfaceReactor("lithium-polarisation")
-    net = ReactorNet([interface])
-    net.rtol = 1e-9
-    net.advance(float(run["time"][-1]))
-    assert interface.evaluations < 100
-    for account in ("made_Li_elyt", "H_neighbours"):
-        assert float(interface.dataset[account][-1]) == pytest.approx(float(run[account][-1]), rel=1e-9)
-
-
-@pytest.mark.parametrize(("rtol", "within"), [(1e-4, 1e-4), (1e-9, 1e-8)])
-def test_accounts_of_an_interface_alone(rtol, within):
-    """The first bonds produce entropy that the integrator's steps do not resolve; bonds follow from the states."""
-    known = surfacechem.run("dna-adhesive", {"run.until": "10 s", "run.rtol": 1e-12})
-    interface = InterfaceReactor("dna-adhesive")
-    net = ReactorNet([interface])
-    net.rtol, net.atol = rtol, 1e-9 * rtol
-    net.advance(10.0)
-    data = interface.dataset
-    assert float(data["entropy_R1"][-1]) == pytest.approx(float(known["entropy_R1"][-1]), rel=20 * within)
-    assert data.attrs["entropy_error"] < within
-    assert max(data.attrs[f"{kind}_error"] for kind in ("energy", "site")) < 1e-10
 
 
 def test_steady_states():
@@ -584,14 +501,6 @@ def test_a_load_given_as_a_function_acts_like_a_history():
     found.load("p", lambda t: 1e5 + 1e4 * t)
     net.advance(0.8)
     np.testing.assert_allclose(found.x, expected.x, rtol=LOOSE, atol=LOOSE * np.abs(expected.x).max())
-
-
-def test_a_load_that_does_not_change():
-    interfaces = [InterfaceReactor(PISTON) for _ in range(3)]
-    for interface, load in zip(interfaces, (lambda _: 1e3, 1e3, "1 kPa"), strict=True):
-        interface.load("F_n", load)
-        ReactorNet([interface]).advance(0.01)
-    assert interfaces[0]["g_n"] == interfaces[1]["g_n"] == interfaces[2]["g_n"] > 0
 
 
 def test_loads_may_read_states_of_their_own_and_of_one_another():

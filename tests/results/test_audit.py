@@ -36,18 +36,6 @@ def burst(K_0=0.8, C_r=1e38, C=1e3) -> Simulation:
     return Simulation(load_text(BURST.format(K_0=K_0, C_r=C_r, C=C)))
 
 
-@pytest.mark.parametrize(("K_0", "peak"), [(0.8, 4e38), (2.76, 1e129)])
-def test_the_first_instant_of_one_law_hides_no_other(K_0, peak):
-    simulation = burst(K_0)
-    solution = simulation.run()
-    assert solution.dataset.sigma_exponential_affinity.max() > peak
-    assert solution.audit.violations == ("mass_action",)
-    assert "the law mass action destroys entropy" in solution.warnings
-    assert solution.dataset.entropy_mass_action[-1] < 0
-    swept = simulation.sweep({"initial.T": [300.0, 310.0]})
-    assert swept.dataset.destroys_entropy.values.tolist() == [1.0, 1.0]
-
-
 def test_a_large_body_hides_no_law():
     """The rounding of its heat content, added up over the steps, is more than what is destroyed."""
     solution = burst(C_r=1e38, C=1e11).run()
@@ -142,37 +130,6 @@ def test_work_that_is_booked_wrong_is_told(mean, part):
     wrong = result.ledger_outputs + part * np.linspace(0, 0.1, len(result.times))[:, None]
     findings = audit.audit(replace(trajectory, result=result._replace(ledger_outputs=wrong))).findings
     assert any("the balance of energy is open" in finding for finding in findings)
-
-
-RING = """
-phases:
-- {name: ring, thermo: ideal-surface, kinetics: surface, species: [A, B, C], site-density: 1e-8 kmol/m^2}
-species:
-- {name: A, composition: {H: 1}, thermo: {model: constant-cp}}
-- {name: B, composition: {H: 1}, thermo: {model: constant-cp}}
-- {name: C, composition: {H: 1}, thermo: {model: constant-cp}}
-reactions:
-- {equation: A => B, rate-constant: {A: 30, b: 0, Ea: 0}}
-- {equation: B => C, rate-constant: {A: 20, b: 0, Ea: 0}}
-- {equation: C => A, rate-constant: {A: 10, b: 0, Ea: 0}}
-"""
-ON_RING = """
-bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
-interface: {temperature: 300 K, mechanism: {file: ring.yaml}}
-initial: {coverages: {A: 1}}
-run: {until: 1 s}
-"""
-
-
-def test_many_laws_are_judged_in_one_search(tmp_path, monkeypatch):
-    """A search evaluates all outputs for each input: for each law anew it would grow with the cube of a mechanism."""
-    searches = []
-    monkeypatch.setattr(audit, "_rounding_of", lambda *a, search=audit._rounding_of: searches.append(a) or search(*a))
-    (tmp_path / "ring.yaml").write_text(RING)
-    (tmp_path / "case.yaml").write_text(ON_RING)
-    balances = surfacechem.load(tmp_path / "case.yaml").run().audit
-    assert sum(part > 0 for part in balances.destroyed.values()) >= 2
-    assert sum(len(groups) > 1 for *_, groups, _ in searches) == 1
 
 
 def test_many_laws_that_destroy_entropy_share_a_warning():

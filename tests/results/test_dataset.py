@@ -76,30 +76,6 @@ def test_every_kind_of_variable_is_in_a_file_that_is_checked():
     assert set().union(*map(kinds, names())) == set().union(*map(kinds, OF_EVERY_KIND))
 
 
-def test_every_unit_follows_the_cf_conventions(suite, tmp_path):
-    units = sorted({column.unit for name in names() for column in solved(name).columns if column.unit})
-    times = [column for column in solved("exothermic").columns if column.name == "time"]
-    others = [Column(f"x_{k}", ("time",), times[0].values, unit, "a quantity") for k, unit in enumerate(units)]
-    write_netcdf(tmp_path / "units.nc", [*times, *others], solved("exothermic").attributes)
-    assert complaints(suite, tmp_path / "units.nc") == []
-
-
-def test_a_file_that_breaks_the_conventions_is_noticed(suite, tmp_path):
-    broken = solved("exothermic").dataset.copy()
-    broken["T"].attrs |= {"units": "degrees of warmth", "standard_name": "warmth_of_contact"}
-    broken.to_netcdf(tmp_path / "broken.nc")
-    found = complaints(suite, tmp_path / "broken.nc")
-    for wrong in ("degrees of warmth", "warmth_of_contact"):
-        assert any(wrong in message for message in found), found
-
-
-def test_carries_the_exact_solution_and_the_residuals(solution):
-    data = solution.dataset
-    assert float(abs(data["T"] - data["T_exact"]).max()) < 1e-6
-    for name in ("energy_residual", "entropy_residual", "site_residual", "least_sigma_linear_affinity"):
-        assert name in data
-
-
 def test_what_the_scene_does_not_have_is_not_there():
     data = surfacechem.run("sliding-dry").dataset
     assert not [name for name in data.variables if name.startswith(("phi", "g_n", "J_c", "mu", "site", "event"))]

@@ -81,18 +81,6 @@ def test_the_choice_of_the_reference_side_changes_phi_but_not_the_bonds():
     assert bonds(2) == pytest.approx(bonds(1), rel=1e-9)
 
 
-def test_tension_has_no_coulomb_friction():
-    def scene(p):
-        return scenes.perfect_contact([], frictions=[Coulomb(mu=0.3)], loading={"v": Hold(level=0.1), "p": p})
-
-    with pytest.raises(InputError, match="p fell below zero, where the law coulomb ends"):
-        run(scene(Hold(level=-1e3)), 0.1)
-    trajectory = run(scene(Ramp(start=1e3, rate=-1e4)), 1.0)
-    assert "p fell below zero" in trajectory.reason
-    assert trajectory.result.t == pytest.approx(0.1, rel=1e-9)
-    assert run(scene(Table(times=[0.0, 0.5], values=[1e3, 0.0])), 1.0).status == "finished"
-
-
 ISOTHERMAL = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
 
 
@@ -183,18 +171,3 @@ def test_fluxes_where_a_shared_temperature_is_prescribed():
     values = trajectory.everywhere
     stored = 3.0 / 300.0 * values("T_1") * 1.0
     assert values("q_1") + values("q_2") == pytest.approx(values("D_coulomb") - stored, rel=1e-12)
-
-
-@pytest.mark.parametrize("ramp", [True, False])
-def test_heat_that_is_drawn_out_is_not_called_ignition(ramp):
-    """A path that conducts less as it cools down brings at most h / (e beta); more than that is drawn."""
-    beta, h = 0.05, 50.0
-    most = h / (math.e * beta)
-    drawn = {"Q_c": Ramp(rate=-2 * most) if ramp else Hold(level=-1.01 * most)}
-    heat = [path("interface", "lower", varying(h, Exponential(beta=-beta)))]
-    trajectory = run(Scene(ISOTHERMAL, Interface("T_c"), heat, drawn, T_0=300.0, initial={"T_c": 300.0}), 1.0, 21)
-    assert trajectory.status == "stopped"
-    assert trajectory.reason.startswith(
-        "runaway cooling: no temperature T_c balances the heat that the interface takes up"
-    )
-    assert trajectory.result.t == pytest.approx(0.5 if ramp else 0.0, rel=1e-6)

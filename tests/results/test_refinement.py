@@ -1,6 +1,5 @@
 """Outputs that follow a run."""
 
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -8,10 +7,8 @@ import pytest
 from case_runs import load, solved
 
 import surfacechem
-from surfacechem.results import refinement
 from surfacechem.results.event_table import events_of
 from surfacechem.results.refinement import needed_rows
-from surfacechem.solve import run
 from surfacechem.tolerances import LINE_ERROR
 
 FOLLOWED = ("stick-slip", "press-hold-pull", "dna-adhesive", "debonding")
@@ -64,31 +61,6 @@ def test_a_long_run_is_shown_as_closely_as_a_brief_one():
     for name in ("v", "E_kinetic_t", "E_spring_t", "D_coulomb"):
         missed = np.interp(times, data.time, data[name]) - dense[name].values
         assert np.abs(missed).max() <= LINE_ERROR * np.ptp(data[name].values), name
-
-
-def test_a_dataset_takes_little_more_memory_than_it_has(monkeypatch):
-    """Rows are looked at in blocks, whose ends are outputs, too."""
-    case = surfacechem.load("stick-slip", ["run.until=12 s"])
-    whole, solution = case.run(error="balances").dataset, case.run(error="balances")
-    for module in (refinement, run):
-        monkeypatch.setattr(module, "ROWS_AT_ONCE", 400)
-    tracemalloc.start()
-    dataset = solution.dataset
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 4 * dataset.nbytes
-    assert len(whole.time) < len(dataset.time) < 1.1 * len(whole.time)
-
-
-@pytest.mark.parametrize("rtol", [1e-4, 1e-2])
-def test_lines_show_a_run_whose_tolerance_is_coarser_than_they_are(rtol):
-    case = surfacechem.load("exothermic", [f"run.rtol={rtol}"])
-    shown = case.run(error="balances").dataset
-    times = tuple(np.linspace(0.0, case.case.run.times[-1], 1001).tolist())
-    dense = case.run(run=replace(case.case.run, times=times, picture=None), error="balances").dataset
-    for name in ("phi", "T", "q_1"):
-        missed = shown[name].interp(time=dense.time) - dense[name]
-        assert np.abs(missed).max() < 2 * LINE_ERROR * np.ptp(dense[name].values), name
 
 
 def test_both_sides_of_every_event_and_the_extremes_of_the_steps_are_outputs():

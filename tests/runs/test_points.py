@@ -64,26 +64,6 @@ def element(tmp_path):
     return surfacechem.load(path)
 
 
-def test_a_prescribed_contact_gives_what_its_formulas_say(element):
-    gaps = np.array([-3e-9, -1e-9, 2e-9])
-    found = element.evaluate({"g_n": gaps, "T_c": "315 K"})
-    stiffness = np.where(gaps < 0, 50e12, 0.5 * 2e12)
-    assert found["t_n"].values == pytest.approx(stiffness * gaps, rel=1e-14)
-    assert found["t_n_by_g_n"].values == pytest.approx(stiffness, rel=1e-14)
-    assert found["t_n_by_g_n"].attrs == {
-        "units": "Pa m-1",
-        "long_name": "derivative of the normal traction on body 1 by the normal gap",
-    }
-    assert found["t_n_by_phi"].values == pytest.approx(np.where(gaps < 0, 0, 2e12 * gaps), rel=1e-14)
-    assert found["t_coulomb_by_g_n"].values == pytest.approx(np.where(gaps < 0, -0.3 * 50e12, 0), rel=1e-14)
-    assert np.array_equal(found["t_n_by_T_c"].values, np.zeros(3))  # a tangent has its zeros, too
-    assert found["q_1"].values == pytest.approx(1500.0, rel=1e-14)
-    assert found["q_2_by_T_c"].values == pytest.approx(250.0, rel=1e-14)
-    assert found["C_1"].values == pytest.approx(1000.0, rel=1e-14)
-    assert found["S_1_by_T_1"].values == pytest.approx(1000 / 300, rel=1e-14)
-    assert np.all(found["admissible"] == 1)
-
-
 @pytest.mark.parametrize("name", POINTS)
 def test_derivatives_are_those_of_the_values(name, element):
     """Central differences of fourth order agree, to the rounding of the values."""

@@ -67,13 +67,6 @@ def test_rupture_is_found_where_a_quadrature_finds_it(pulled, k, w):
     assert solution.audit.energy_error < 1e-10
 
 
-def test_bonds_that_fade_do_not_rupture(pulled):
-    """Where the largest force is small all of it can be followed."""
-    solution = pulled(1e10, 3e-8)
-    assert solution.status == "finished"
-    assert solution.dataset["theta_bond_s"].values[-1] < 1e-9
-
-
 @pytest.mark.parametrize(("force", "capped"), [("20 pN", False), ("6 nN", True)])
 def test_a_rate_that_is_capped_is_never_used_silently(tmp_path, force, capped):
     (tmp_path / "bonds.yaml").write_text(MECHANISM.replace(f", bond: {{stiffness: {STIFFNESS} N/m}}", ""))
@@ -84,42 +77,3 @@ def test_a_rate_that_is_capped_is_never_used_silently(tmp_path, force, capped):
     said = [warning for warning in solution.warnings if "above 300 the rate goes on along its tangent" in warning]
     assert bool(said) == capped
     assert all(np.all(np.isfinite(column.values)) for column in solution.columns if column.values.dtype.kind == "f")
-
-
-RETRACT = """
-bodies: {plate: {temperature: 298.15 K}, tip: {temperature: 298.15 K}}
-interface:
-  temperature: 298.15 K
-  mechanism: {file: MECHANISM, bonds: [bond(s)]}
-loading: {g_n: HISTORY}
-initial: {coverages: COVERAGES}
-run: {until: END s, outputs: 41}
-"""
-BIMOLECULAR = MECHANISM.replace("bond(s) => free(s)", "bond(s) <=> free(s) + open(s)").replace(
-    "- {name: bond(s), composition: {},",
-    "- {name: open(s), composition: {}, thermo: {model: constant-cp}}\n- {name: bond(s), composition: {}, sites: 2,",
-)
-ONE_WAY_BACK = MECHANISM.replace("=>", "<=>")
-
-
-@pytest.mark.parametrize("far", [100, 3000])
-@pytest.mark.parametrize("kind", ["first order", "second order"])
-def test_a_tip_may_be_withdrawn_and_come_back(tmp_path, far, kind):
-    """Springs under 16 nN let go within 1e-13 of the time and form again as if nothing had been."""
-    text, rest = (ONE_WAY_BACK, "free(s): 1") if kind == "first order" else (BIMOLECULAR, "free(s): 0.5, open(s): 0.5")
-    (tmp_path / "bonds.yaml").write_text(text)
-
-    def run(history, end, coverages):
-        case = RETRACT.replace("MECHANISM", "bonds.yaml").replace("HISTORY", history).replace("END", str(end))
-        (tmp_path / "case.yaml").write_text(case.replace("COVERAGES", f"{{{coverages}}}"))
-        return surfacechem.run(tmp_path / "case.yaml")
-
-    points = f"{{times: [0 s, 5 s, 20 s, 40 s], values: [0 nm, 0 nm, {far} nm, 0 nm]}}"
-    whole = run(f"{{table: {points}}}", 40, rest)
-    assert whole.status == "finished"
-    assert whole.audit.violations == ()
-    assert whole.audit.site_error < 1e-8
-    assert whole.audit.energy_error < 1e-9
-    near = 40.0 * 20 / far  # the last 40 nm of the way back
-    back = run(f"{{table: {{times: [0 s, {near} s], values: [40 nm, 0 nm]}}}}", near, rest)
-    assert whole.dataset.phi.values[-1] == pytest.approx(back.dataset.phi.values[-1], rel=1e-8)

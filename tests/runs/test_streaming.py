@@ -10,7 +10,6 @@ import sys
 import time
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,7 +26,6 @@ from surfacechem.runs import checking, streaming
 from surfacechem.runs.checking import check
 from surfacechem.runs.keeping import STATUSES, Keep, extremes
 from surfacechem.runs.summaries import store_summary
-from surfacechem.solve.run import Run
 from surfacechem.tolerances import LINE_ERROR
 
 pytestmark = pytest.mark.around
@@ -440,16 +438,6 @@ def test_the_steps_of_runs_follow_from_stiffness(name, solver, told):
     assert streaming.steps_of(simulation) == told
 
 
-def test_fluxes_that_vanish_at_rest_are_known_relative_to_their_largest_values(tmp_path):
-    """At 1e-13 of them rounding is all that is left, other than in a run by itself."""
-    section = {"over": {"heat.conductance.h": [1900.0, 2000.0]}, "keep": {"last": ["q_reaction", "q_1"]}}
-    case = surfacechem.load("dna-adhesive", {"sweep": section})
-    stream = case.stream(case.plan(), tmp_path / "rest.zarr")
-    data = stream.run().dataset
-    assert stream.check().error < 1e-7
-    assert np.all(np.abs(data["q_reaction_last"]) < 1e-6)  # W/m^2, of 2e5 at the start
-
-
 def test_chunks_of_a_grid_are_blocks_of_it():
     layout = Layout(
         {"a": 5, "b": 7, "time": 3}, ("a", "b"), {"x": StoredArray("float64", ("a", "b"), {})}, {}, [], {}, 16
@@ -533,54 +521,10 @@ def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypa
     assert sorted(steps[few]) == sorted(np.sort(steps)[-3:])
 
 
-def test_the_source_of_errors_is_told_once_however_many_runs_are_checked(tmp_path, monkeypatch):
-    monkeypatch.setattr(checking, "RUNS_AT_ONCE", 2)
-    stream = begun(case(keep=ENDS, over={"initial.T": [290, 295, 300, 305, 310]}, checked="all"), tmp_path / "o.zarr")
-    stream.run(1)
-    source = check(stream).source
-    assert source.count("estimate: a second sweep") == source.count("does not apply to this scene") == 1
-
-
-def test_an_error_of_a_run_contains_that_of_its_extremes(tmp_path):
-    stream = begun(case("stick-slip-debonding", {"max": ["v"]}, {"loading.p.level": [1e5, 1.1e5]}), tmp_path / "o.zarr")
-    exact = surfacechem.run("stick-slip-debonding", ["run.outputs=30001"]).dataset["v"].max()
-    missed = float(1 - stream.run().dataset["v_max"][0] / exact)
-    assert 1e-4 < missed < 1.1 * check(stream).error < 3 * missed
-
-
 def test_a_notebook_shows_where_a_store_is_and_not_all_that_it_is_made_of(tmp_path):
     stream = begun(case(keep=ENDS, over={"initial.T": [290, 310]}), tmp_path / "o.zarr")
     assert repr(stream) == f"Stream(store={stream.store}, part=(1, 1))"
     assert repr(stream.store) == f"Store(path={tmp_path / 'o.zarr'!r})"
-
-
-def test_what_is_nothing_but_rounding_at_the_end_is_no_error(tmp_path):
-    """Heat flows into one body as out of the other, and their mean is the rounding of both."""
-    stream = begun(case("cooling-to-zero", over={"initial.T": [100, 1000]}), tmp_path / "s.zarr")
-    stream.run()
-    assert stream.check().error < 1e-10
-
-
-def test_an_error_that_is_unknown_and_an_end_that_is_no_number_count_for_no_small_error(monkeypatch):
-    ends = {"status": np.zeros(4, int), "time_reached": np.ones(4), "T_last": np.array([300.0, np.nan, 300.0, 303.0])}
-    ends["status"][:] = STATUSES.index("finished")
-    kept = ends | {"T_last": np.array([300.0, np.nan, np.nan, 300.0])}
-    monkeypatch.setattr(checking, "RunByRun", lambda *_: SimpleNamespace(columns=lambda *_: ends))
-    done = SimpleNamespace(
-        accuracy=SimpleNamespace(errors=np.array([np.nan, 1e-9, 1e-9, 1e-9]), source="", why=""),
-        run_ends=[dict.fromkeys(checking.BALANCE_COLUMNS, 0.0)] * 4,
-        runs=[SimpleNamespace(sample=SimpleNamespace(roundings={}), stored=None)] * 4,
-        audits=[],
-    )
-    simulation, plan = (SimpleNamespace(**{name: lambda *_: done}) for name in ("sweep_plan", "picked"))
-    simulation.case = SimpleNamespace(run=Run((0.0, 1.0)))
-    model = SimpleNamespace(system=SimpleNamespace(state_columns={"T": 0}))
-    chunks = SimpleNamespace(
-        model=model, keep=Keep(last=("T",)), columns=lambda _: kept, simulation=simulation, plan=plan, changes={}
-    )
-    chunks.run = Run((0.0, 1.0))
-    ((_, _, found, _),) = checking._errors(SimpleNamespace(chunks=chunks), np.arange(4), None)
-    assert found["error"] == pytest.approx([np.nan, 1e-9, np.inf, 1 / 101], nan_ok=True)
 
 
 def test_runs_that_failed_are_run_again_alone(tmp_path):

@@ -18,13 +18,11 @@ from surfacechem.runs import rerun
 from surfacechem.runs.checking import check
 from surfacechem.runs.summaries import sweep_summary
 from surfacechem.runs.sweeps import parameter_names
-from surfacechem.solve import run as integrate
 from surfacechem.solve.radau.solver import Radau
 
 pytestmark = pytest.mark.around
 
 RATE = "loading.f.ramp.rate"
-K_0 = "interface.potential.bond-energy.K_0"
 
 
 @pytest.fixture(scope="module")
@@ -91,72 +89,12 @@ def test_what_has_no_lifetime_says_so(tmp_path):
         case.stream(case.plan(), tmp_path / "lifetimes.zarr")
 
 
-def test_a_run_that_ends_too_early_determines_no_force_of_rupture():
-    found = surfacechem.sweep("force-spectroscopy", {RATE: ["100 pN/s"]}, {"f": "3 pN"})
-    assert np.isnan(found.statistics[0]["mode"])
-    assert found.accuracy.unknown == "unknown in 1 run: the run ended with too many bonds left"
-
-
-def test_bonds_of_a_mechanism_have_a_spectrum():
-    data = surfacechem.sweep("l-selectin-tether").dataset
-    for one in data["rate"]:
-        bond, found = get("bell-ramp")(k_off=3.0, x_off=4e-10, T=298.15, rate=one.item()), data.sel(rate=one)
-        for which in ("mode", "median", "mean"):
-            assert found[f"f_{which}"].item() == pytest.approx(getattr(bond, which), rel=1e-9, abs=1e-24)
-
-
 def test_biotin_breaks_near_the_forces_that_were_measured():
     """200 pN at 1.5 nN/s and 230 pN at 110 nN/s, Sedlak et al. (2017); the off-rate is known to a power of ten."""
     data = surfacechem.sweep("biotin-streptavidin").dataset
     assert data.attrs["error"] < 1e-10
     slow, fast = (data["f_mode"].sel(rate=rate, method="nearest").item() for rate in (1.5e-9, 110e-9))
     assert (slow, fast) == (pytest.approx(200e-12, rel=0.02), pytest.approx(230e-12, rel=0.1))
-
-
-def test_extremes_are_those_of_the_runs_and_of_the_outputs_that_all_share():
-    data = surfacechem.sweep("stick-slip", {"loading.w_t.ramp.rate": ["1 mm/s", "2 mm/s"]}).dataset
-    for at, speed in enumerate(("1 mm/s", "2 mm/s")):
-        single = surfacechem.run("stick-slip", {"loading.w_t.ramp.rate": speed}).dataset
-        assert data.v_max[at] == pytest.approx(single.v.max().item(), rel=0.01)
-        assert data.v_max[at] == pytest.approx(data.v[at].max().item(), rel=1e-12)
-        assert data.t_t_min[at] == pytest.approx(single.t_t.min().item(), rel=0.01)
-
-
-def test_outputs_follow_the_runs_of_a_sweep():
-    """As close as in the closest of them: lines between them show what happens."""
-    case = surfacechem.load("exothermic")
-    few, many = (case.sweep({"initial.T": np.linspace(280, 320, n).tolist()}) for n in (2, 80))
-    own = [case.run(point).dataset for point in few.plan.points]
-    assert max(each.sizes["time"] for each in own) < few.dataset.sizes["time"] < 200
-    assert many.dataset.sizes["time"] < 4 * own[0].sizes["time"]
-    start = many.dataset.initial_T.values[41]
-    closer = surfacechem.run("exothermic", ["run.outputs=20001", f"initial.T={start}"]).dataset
-    for name in ("T", "phi", "q_reaction"):
-        lines = np.interp(closer.time.values, many.dataset.time.values, many.dataset[name].values[41])
-        assert np.abs(lines - closer[name].values).max() < 1e-3 * np.ptp(closer[name].values)
-
-
-def test_outputs_that_are_asked_for_are_kept():
-    swept = surfacechem.load("stick-slip", ["run.outputs=21"]).sweep({"interface.friction.coulomb.mu": [0.2, 0.3]})
-    assert np.allclose(swept.dataset.time, np.linspace(0, 3, 21), rtol=1e-15)
-
-
-def test_a_sweep_compiles_nothing_once_it_has_run(spectrum, monkeypatch):
-    simulation = surfacechem.load("force-spectroscopy")
-    first = simulation.sweep().dataset
-    monkeypatch.setattr(integrate, "compile_program", lambda *_: pytest.fail("compiled"))
-    again = simulation.sweep({RATE: ["1 pN/s", "1 nN/s"]}).dataset
-    assert again.sizes["rate"] == 2
-    assert first["f_mode"].values.tobytes() == spectrum.dataset["f_mode"].values.tobytes()
-
-
-def test_errors_against_an_exact_solution_of_each_run(bonding):
-    data = bonding.sweep({K_0: [100.0, "0.3 kJ/m^2"], "bodies.lower.C": [1.0, 2.0, 3.0]}).dataset
-    assert data["T"].dims == ("K_0", "C", "time")
-    assert data["K_0"].values.tolist() == [100.0, 300.0]
-    assert data.attrs["error_source"].startswith("exact solution exothermic-bonding")
-    for name in ("error", "energy_error", "entropy_error", "site_error"):
-        assert data.attrs[name] == data[name].values.max() < 1e-8
 
 
 def test_no_errors_are_found_where_no_runs_are_checked(tmp_path, monkeypatch):
@@ -174,15 +112,6 @@ def test_no_errors_are_found_where_no_runs_are_checked(tmp_path, monkeypatch):
 def test_a_sweep_can_be_run_again_from_its_file(spectrum, tmp_path):
     record = rerun.read(spectrum.write(tmp_path / "spectrum.nc"))
     assert rerun.differences(record, rerun.run_again(record)) == []
-
-
-def test_survival_down_to_1e_282():
-    case = surfacechem.load("bond-constant-force", {"run.atol": 1e-300, "run.until": "358 s"})
-    data = case.run().dataset
-    phi = data["phi"].values
-    exact = get("bell-constant-force")(k_off=0.1, x_off=4e-10, T=300.0, f=3e-11).solution(data["time"].values)
-    assert phi[-1] < 1e-281
-    np.testing.assert_allclose(np.log(phi), exact["ln_phi"], rtol=1e-8, atol=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -354,16 +283,6 @@ def test_command_line(tmp_path, monkeypatch):
     assert "rate (1 to 1000 pN/s, 2 values), each until f = 1.5e-10 N" in done.stdout
     with xarray.open_dataset("s.nc") as data:
         assert data["phi"].dims == ("rate", "f")
-
-
-def test_an_exact_solution_is_that_of_every_run_or_of_none():
-    """Between two runs that it fits lies one that it does not: no number there is held against another scene's."""
-    case = surfacechem.load("stick-slip", ["run.until=1.5 s"])
-    swept = case.sweep({"interface.friction.coulomb.mu": [0.2, 0.6, 0.3]})
-    alone = case.run({"interface.friction.coulomb.mu": 0.6})
-    assert "exact solution stick-slip does not apply to this scene" in alone.accuracy.source
-    assert "exact solution stick-slip does not apply to this scene" in swept.accuracy.source
-    assert swept.accuracy.errors[1] == pytest.approx(alone.accuracy.error, rel=1e-9, nan_ok=True)
 
 
 def test_why_an_error_is_not_known_is_said_once(tmp_path):

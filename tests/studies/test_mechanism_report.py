@@ -11,11 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from mechanisms import KMOL, SHIPPED, cantera_of, load, mechanism_texts, pulled, species_of
+from mechanisms import KMOL, cantera_of, load, mechanism_texts
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
 from surfacechem.mechanism import load_mechanism
-from surfacechem.quantities import BOLTZMANN
 from surfacechem.studies import mechanism_report
 from surfacechem.studies.mechanism_report import (
     Curves,
@@ -66,37 +65,6 @@ def compare(mechanism, temperature):
         assert got == pytest.approx(log_K, rel=1e-9, abs=1e-9)
 
 
-def at_force(mechanism, force):
-    """The load at which the first elastic bond, or every bond, carries a force."""
-    spring = next((item.spring for item in species_of(mechanism) if item.spring), None)
-    return {"gap": spring.rest_length + force / spring.stiffness if spring else 0.0, "force": force}
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-@pytest.mark.parametrize("force", [0.0, 15e-12, 60e-12])
-def test_numbers_under_force_are_cantera_s(name, force):
-    """Rates per possible bond at coverages of one, and the constant that the elastic energy shifts."""
-    mechanism = load(name)
-    surface, curves = pulled(mechanism, 311.0, **at_force(mechanism, force)), Curves(mechanism)
-    surface.set_unnormalized_coverages(np.ones(surface.n_species))
-    at = np.array([311.0]), np.array([force])
-    for i, (label, law) in enumerate(curves.laws.items()):
-        bond = min(full(surface, law).values())
-        for curve, rates in (
-            (curves.log_forward, surface.forward_rates_of_progress),
-            (curves.log_reverse, surface.reverse_rates_of_progress),
-        ):
-            got = curve(label, *at)
-            assert rates[i] == 0 if got is None else got == pytest.approx(math.log(rates[i] * KMOL / bond), rel=1e-10)
-        log_K = sum(nu * math.log(KMOL / full(surface, law)[x]) for x, nu in law.change.items())
-        log_K += math.log(surface.equilibrium_constants[i])
-        for pair in curves.pairs:  # which a prescribed force works on, along the difference of their distances
-            forward, backward = (next(iter(laws.values())) for laws in (pair.forward, pair.backward))
-            sign = {**dict.fromkeys(pair.forward, 1), **dict.fromkeys(pair.backward, -1)}.get(label, 0)
-            log_K += sign * force * (forward.x_beta - backward.x_beta) / (BOLTZMANN * 311.0)
-        assert curves.log_equilibrium(label, *at) == pytest.approx(log_K, rel=1e-9, abs=1e-9)
-
-
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     return tmp_path_factory.mktemp("mechanisms") / "random.yaml"
@@ -111,32 +79,6 @@ def test_numbers_of_random_mechanisms_are_cantera_s(file, text, temperature):
     compare(mechanism, temperature)
     printed = mechanism_sheet(Curves(mechanism), Span(300.0, 1200.0), F)
     assert not re.search(r"\b(nan|inf)\b", printed)
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_forward_over_reverse_is_the_constant(name):
-    curves = Curves(load(name))
-    temperatures = T.values(7)
-    for label, law in curves.laws.items():
-        reverse = curves.log_reverse(label, temperatures, NONE)
-        if not law.reversible:
-            assert reverse is None
-            paired = any(label in pair.labels for pair in curves.pairs)
-            assert verdict(curves, label, T, F).startswith("pair with" if paired else "runs one way only")
-            continue
-        ratio = curves.log_forward(label, temperatures, NONE) - reverse
-        np.testing.assert_allclose(ratio, curves.log_equilibrium(label, temperatures, NONE), rtol=1e-12)
-        assert verdict(curves, label, T, F).startswith("consistent by construction")
-
-
-def test_prints_the_measured_rates(call):
-    done = call("selectin", "-T", "298.15 K")
-    assert done.exit_code == 0, done.stderr
-    lines = [line.split() for line in done.stdout.splitlines()]
-    assert ["reverse", "[1/s]", "1.408"] in lines
-    assert ["R1", "K", "[1]", "207.6"] in lines
-    assert "consistent by construction" in done.stdout
-    assert re.search(r"R1  L\(s\) \+ P\(s\) <=> PL\(s\)  \(interface-Arrhenius, .*selectin\.yaml:\d+\)", done.stdout)
 
 
 @pytest.mark.parametrize(
@@ -280,21 +222,6 @@ def test_rates_that_no_thermo_allows(curves):
     np.testing.assert_allclose(np.abs(cycle.departure(found, WARM, NONE)), np.log(4), rtol=1e-12)
     text = mechanism_sheet(found, Span(280.0, 360.0), Span(0.0, 0.0))
     assert "R1 R2 R3 R4 R5 R6  INCONSISTENT: the product of k_f/k_r is not 1 but exp(1.39)" in text
-
-
-def test_reversible_reactions_agree_by_construction(curves):
-    assert cycles(curves(PAIRS.split("- {equation: a(s) => c(s)")[0])) == []
-    assert cycles(curves(one_way("a(s) <=> b(s)", "b(s) <=> c(s)", "a(s) <=> c(s)"))) == []
-
-
-def test_a_force_opens_a_cycle(curves):
-    """Bell factors around a cycle have to add up to nothing."""
-    loaded = PAIRS.replace("LAST", "3.0").replace("a(s) => b(s),", "a(s) => b(s), type: Bell, x-beta: 0.3 nm,")
-    found = curves(loaded)
-    (cycle,) = cycles(found)
-    force = np.array([0.0, 20e-12])
-    expected = force * 0.3e-9 / (1.380649e-23 * 300.0)
-    np.testing.assert_allclose(np.abs(cycle.departure(found, np.array(300.0), force)), expected, atol=1e-12)
 
 
 def test_what_cannot_run_back_never_stops(curves):

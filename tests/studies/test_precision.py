@@ -14,10 +14,9 @@ import surfacechem
 from surfacechem.cli.main import app
 from surfacechem.plots import figure
 from surfacechem.plots.study import LABEL_VARIABLES
-from surfacechem.results.accuracy import relative_errors
 from surfacechem.solve.adapters import sundials
 from surfacechem.studies import precision
-from surfacechem.studies.precision import NORMS, Subject, establish, numerical
+from surfacechem.studies.precision import Subject, establish, numerical
 from surfacechem.studies.report import LIBRARIES, Study
 
 pytestmark = pytest.mark.around
@@ -63,39 +62,6 @@ def subject_of(name, *overrides):
 # -- errors ------------------------------------------------------------------------------------------------------------
 
 
-def test_errors_fall_with_the_tolerance_and_the_worst_variable_counts(data):
-    assert np.all(np.diff(data["energy_error"].values, axis=-1) < 0)
-    assert list(data["variable"].values) == ["phi", "T"]
-    for kind in NORMS:
-        errors = data[f"error_{kind}"]
-        assert np.all(np.diff(errors.values, axis=-1) < 0)
-        assert np.all(errors < 1e-2)
-        assert np.all(errors <= data["error_max"])
-        assert np.all(data[f"uncertainty_{kind}"] < 1e-14)
-        assert np.array_equal(data[f"variable_error_{kind}"].max("variable"), errors)
-
-
-def test_the_error_is_that_of_the_run(data):
-    """It is the largest of the same one, at the steps of another run; three points miss an eighth of a wave."""
-    simulation = surfacechem.load("exothermic")
-    alone = simulation.run(run=replace(simulation.case.run, rtol=1e-7)).accuracy.variables
-    ours = data["variable_error_max"].sel({"case": "exothermic", "solver": "radau", "tolerance": 1e-7})
-    for name in ("phi", "T"):
-        assert float(ours.sel(variable=name).item()) == pytest.approx(alone[name], rel=1 - np.cos(np.pi / 6))
-
-
-def test_a_named_quantity_without_an_exact_value_is_held_against_two_methods(data):
-    found = run("exothermic", ["radau"], [1e-4, 1e-7], ["T", "S_total"]).dataset.set_index(LABEL_VARIABLES)
-    assert str(found["reference"].values[0]).startswith("exact solution exothermic-bonding; S_total: ")
-    errors = found["variable_error_max"].sel(variable="S_total").values.ravel()
-    assert errors[1] < errors[0] < 1e-4
-    at_T = [
-        item["variable_error_max"].sel({"variable": "T", "tolerance": [1e-4, 1e-7], "solver": ["radau"]}).values
-        for item in (data, found)
-    ]
-    assert np.array_equal(*at_T)  # whatever else is compared
-
-
 def test_the_times_of_events_have_errors():
     found = run("coulomb-stop", ["radau", "cvode"], [1e-5, 1e-9]).dataset
     errors, limit = found["error_event"].values[0], found["uncertainty_event"].values[0]
@@ -105,26 +71,6 @@ def test_the_times_of_events_have_errors():
 
 
 # -- references --------------------------------------------------------------------------------------------------------
-
-
-HONEST = [("exothermic", ("phi", "T")), ("coulomb-stop", ("T",)), ("sliding-dry", ("T",))]
-SLOW = [("cooling-to-zero", ("T",)), ("adiabatic-arrhenius", ("T",)), ("stick-slip", ("T",))]
-
-
-@pytest.mark.parametrize(
-    ("name", "variables"), [*HONEST, *(pytest.param(*each, marks=pytest.mark.slow) for each in (*HONEST, *SLOW))]
-)
-def test_a_computed_reference_is_as_good_as_it_says(name, variables):
-    subject = subject_of(name)
-    exact, found = establish(subject, variables), numerical(subject, variables)
-    assert found.status == exact.status
-    n = min(len(exact.times), len(found.times))
-    for variable in variables:
-        error = relative_errors(found.values[variable][:n], exact.values[variable][:n], found.floors[variable][:n])
-        # The last steps before an end that physics sets are as uncertain as its time.
-        limit = found.uncertainty["max", variable] + exact.uncertainty["max", variable]
-        assert error.max() <= 3 * limit
-        assert limit < 1e-8
 
 
 @pytest.mark.parametrize(
@@ -228,16 +174,6 @@ def test_a_solver_that_cannot_run_a_case_is_left_out(monkeypatch):
 
 
 # -- the dataset and the report ----------------------------------------------------------------------------------------
-
-
-def test_counts_are_the_solvers_own(data):
-    counts = data.sel({"case": "exothermic", "tolerance": 1e-7})
-    assert np.isnan(counts["count_rejected"].sel(solver="lsoda"))
-    assert counts["count_rejected"].sel(solver="radau") >= 0
-    # LSODA asks for few right-hand sides a step; those for 201 outputs are not among them.
-    assert counts["count_residuals"].sel(solver="lsoda") < 3 * counts["count_steps"].sel(solver="lsoda")
-    assert np.isnan(counts["stepping_seconds"].sel(solver="radau"))
-    assert counts["stepping_seconds"].sel(solver="lsoda") <= counts["run_seconds"].sel(solver="lsoda")
 
 
 def test_opens_plainly_over_case_solver_and_tolerance(written):

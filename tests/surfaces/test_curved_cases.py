@@ -6,9 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import symengine
-from case_runs import load, solved
 from sampling import every
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, linprog
 
 import surfacechem
@@ -17,8 +15,6 @@ from surfacechem.expressions import derivative, exp
 from surfacechem.laws.free_energy import EquilibriumBonds, Penalty
 from surfacechem.laws.longrange import InversePower, LennardJonesSpherePlane
 from surfacechem.model.system import DUMMY_STATE
-from surfacechem.references.base import SceneView
-from surfacechem.results.matching import match
 from surfacechem.runs.summaries import run_summary
 from surfacechem.surfaces import patches, potential
 from surfacechem.surfaces.approach import fitted
@@ -64,19 +60,6 @@ def data(tmp_path, text, scene=SCENE):
     return surfacechem.run(written(tmp_path, text, scene)).dataset
 
 
-def integrated(push, c, m, start, time):
-    """The gap [m] under a force [N] by an integration in nm and us."""
-
-    def scaled(t, y):
-        pull = push(y[0] * 1e-9)
-        return [y[1], (pull - c * y[1] * 1e-3) / m * 1e-3] if m else [pull / c * 1e3]
-
-    found = solve_ivp(
-        scaled, (0, 1), [start, 0.0] if m else [start], "DOP853", time.values * 1e6, rtol=1e-13, atol=1e-13
-    )
-    return found.y[0] * 1e-9
-
-
 RAMP = "loading: {F_n: {ramp: {start: -1 nN, rate: 1.5 mN/s}}}\n"
 MOVED = "loading: {g_n: {ramp: {start: 5 nm, rate: -4 mm/s}}}\n"
 HELD = """
@@ -113,23 +96,6 @@ def test_the_error_of_a_run_holds_that_of_its_integrals(tmp_path, rtol):
     assert found.attributes["integrals_seconds"] > 0
 
 
-def test_a_quasi_static_gap_is_where_spring_and_force_balance(tmp_path):
-    found = data(tmp_path, HELD + RUN)
-    for w, g in zip(found.w_n.values[::5], found.g_n.values[::5], strict=True):
-        exact = brentq(lambda x, w=w: 5.0 * (w - x) - force(x), w - 0.4e-9, w, xtol=1e-20, rtol=1e-14)
-        assert g == pytest.approx(exact, rel=1e-8)
-
-
-@pytest.mark.parametrize(("m", "c"), every(3, [(2e-15, 1e-9), (2e-15, 0.0), (0.0, 1e-9)]))
-def test_a_mass_or_a_damper_moves_as_integrated_by_itself(tmp_path, m, c):
-    holds = ", ".join(f"{name}: {value} {unit}" for name, value, unit in (("m", m, "kg"), ("c_g", c, "N s/m")) if value)
-    text = f"mechanics: {{normal: {{k: 0.5 N/m, {holds}}}}}\nloading: {{w_n: 5 nm}}\ninitial: {{T: 300 K, g_n: 4 nm}}\n"
-    found = data(tmp_path, text + RUN)
-    exact = integrated(lambda g: 0.5 * (5e-9 - g) - force(g), c, m, 4.0, found.time)
-    assert found.g_n.values == pytest.approx(exact, rel=1e-8)
-    assert found.attrs["energy_error"] < 1e-9
-
-
 WALL = SCENE.replace("from: 0.4 nm", "from: 0.12 nm")
 
 
@@ -138,16 +104,6 @@ def test_a_dead_load_holds_a_sphere_where_the_force_is_its_own(tmp_path):
     for pull, g in zip(found.F_n.values[::5], found.g_n.values[::5], strict=True):
         exact = brentq(lambda x, pull=pull: pull - force(x), 1.2e-10, 2e-10, xtol=1e-22, rtol=1e-14)
         assert g == pytest.approx(exact, rel=1e-8)
-
-
-@pytest.mark.parametrize(("m", "c"), every(2, [(0.0, 1e-6), (2e-15, 0.0)]))
-def test_a_dead_load_moves_a_sphere_as_integrated_by_itself(tmp_path, m, c):
-    holds = "m: 2e-15 kg" if m else "c_g: 1e-6 N s/m"
-    text = f"mechanics: {{normal: {{{holds}}}}}\nloading: {{F_n: 1 nN}}\ninitial: {{T: 300 K, g_n: 0.25 nm}}\n"
-    found = data(tmp_path, text + RUN, WALL)
-    exact = integrated(lambda g: 1e-9 - force(g), c, m, 0.25, found.time)
-    assert found.g_n.values == pytest.approx(exact, rel=1e-8)
-    assert found.attrs["energy_error"] < 1e-9
 
 
 def test_densities_thin_out_as_the_area_grows(tmp_path):
@@ -167,39 +123,9 @@ def test_a_stretch_of_the_area_is_refused_where_laws_of_the_gap_have_no_densitie
         data(tmp_path, "loading: {g_n: 1 nm, J_c: 1.2}\n" + START + RUN, scene)
 
 
-def test_other_numbers_of_the_pair_can_be_swept_and_change_the_force(tmp_path):
-    path = written(tmp_path, "loading: {g_n: 1 nm}\n" + START + RUN)
-    simulation, changed = surfacechem.load(path), {"surface.pair.lennard-jones-pair.n_1": 1e19}
-    usual, doubled = (simulation.run(changes).dataset for changes in ({}, changed))
-    for name in ("t_n", "force"):
-        assert doubled[name].values == pytest.approx(2 * usual[name].values, rel=1e-12)
-
-
 def test_what_the_integrals_hold_is_refused_in_a_sweep():
     with pytest.raises(InputError, match=r"surface.bodies.sphere.sphere.R cannot be swept: .* by --set"):
         surfacechem.sweep("sticky-sphere", {"surface.bodies.sphere.sphere.R": [1e-6, 2e-6]})
-
-
-@pytest.mark.parametrize("name", ["van-der-waals-sphere", "sticky-sphere"])
-def test_snap_in_and_pull_off_free_the_energy_that_closed_forms_say(name):
-    found = solved(name).dataset
-    case = load(name).case
-    view = SceneView(case.scene, solved(name).trajectory)
-    off, on = match(case.reference.name, {}, view).jumps
-    assert found.event_released.values == pytest.approx([on.release, off.release], rel=1e-8)
-    assert found.g_n_after.values == pytest.approx([on.g_after, off.g_after], rel=1e-7)
-
-
-def test_heat_flows_over_the_curved_gap_as_integrated_over_the_sphere():
-    """Over the sphere dA = 2 pi R dz, so that k / (z + M) gives a logarithm."""
-    found, R, M = solved("sticky-sphere").dataset, 1e-6, 301e-9
-    g = found.g_n.values
-    apart, touching = np.maximum(g, 0), np.maximum(-g, 0)
-    conductance = 2 * np.pi * R * 0.026 * (np.log((g + 2 * R + M) / (apart + M)) + touching / M)
-    assert found.q_12.values == pytest.approx(conductance * 30, rel=1e-8)
-    assert found.q_12.attrs["units"] == "W"
-    area = 2 * np.pi * R * np.maximum(-found.approach.values, 0)
-    assert found.contact_area.values == pytest.approx(area, rel=1e-9, abs=1e-30)
 
 
 @pytest.mark.parametrize(
@@ -256,25 +182,6 @@ def test_what_is_wrong_is_told_before_anything_is_integrated(tmp_path, monkeypat
     assert old in text
     with pytest.raises(InputError, match=message):
         data(tmp_path, "", text.replace(old, new))
-
-
-def test_the_field_of_tractions_is_that_of_the_sum_over_pairs():
-    """A sphere pulls at a point as its potential, 2 pi R / ((m - 2) rho) [(rho - R)^(2-m) - (rho + R)^(2-m)], falls."""
-    found, R = solved("ball-in-a-socket").dataset, 20e-9
-    psi, g_0, n = 4e-21, 3e-10, 25e36
-    x, y, z = (found[f"surface_{axis}"].values[:, 0] for axis in "xyz")
-    d = float(found.approach.values[0])
-    away = np.stack([x, y, z - R - d])
-    rho = np.linalg.norm(away, axis=0)
-    r = symengine.Symbol("r")
-    total = sum(
-        n * psi * c * g_0**m * 2 * symengine.pi * R / ((m - 2) * r) * ((r - R) ** (2 - m) - (r + R) ** (2 - m))
-        for m, c in ((10, 1 / 45), (4, -1 / 3))
-    )
-    slope = np.array([float(total.diff(r).subs({r: value})) for value in rho])
-    inward = np.stack([-x, -y, 25e-9 - z]) / 25e-9
-    exact = -slope * np.sum(away / rho * inward, axis=0)
-    assert found.traction.values[0, :, 0] == pytest.approx(exact, rel=1e-7, abs=1e-9 * np.abs(exact).max())
 
 
 def test_a_scene_without_surfaces_imports_nothing_of_them():

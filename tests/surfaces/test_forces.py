@@ -1,25 +1,23 @@
 """Forces of pairs of points and of laws of the gap: closed forms, balance, order of convergence, limits."""
 
-import itertools
 import math
 
 import mpmath
 import numpy as np
 import pytest
-from sampling import every
 from scipy.optimize import minimize_scalar
 
 from surfacechem.errors import InputError
 from surfacechem.laws.free_energy import BondedContact, EquilibriumBonds, Penalty
 from surfacechem.laws.heat_transfer import GasGap
-from surfacechem.laws.longrange import InversePower, LennardJonesPair, LennardJonesSpherePlane, PairTable, PenaltyPair
+from surfacechem.laws.longrange import InversePower, PairTable, PenaltyPair
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.surfaces import patches
 from surfacechem.surfaces.forces import between_flats, density, interaction, over_gap
-from surfacechem.surfaces.inner_sums import LAST_LEVEL, inner_sums, table
+from surfacechem.surfaces.inner_sums import LAST_LEVEL, inner_sums
 from surfacechem.surfaces.potential import CurvedSurfaces
 from surfacechem.surfaces.projection import Surface
-from surfacechem.surfaces.shapes import Cap, Cavity, Cone, Cylinder, Disc, Paraboloid, Plane, Sphere, Torus
+from surfacechem.surfaces.shapes import Cone, Cylinder, Disc, Paraboloid, Plane, Sphere, Torus
 
 GAS = density(GasGap(between=("a", "b"), k=0.026, M=0.3))
 
@@ -57,14 +55,6 @@ def test_two_spheres_are_closed_forms(d, m):
     assert np.abs(found.moment_1 + found.moment_2).max() <= 1e-13 * np.abs(found.force_1).max() * 4
 
 
-@pytest.mark.parametrize("m", [4, 6])
-def test_a_sphere_in_a_cavity_is_a_closed_form_whichever_is_the_first(m):
-    d, R, hollow = 0.01, 1.0, 3.0
-    exact = float(closed(hollow - R - d, R, hollow, m))
-    for bodies in ((Sphere(R=R), Cavity(R=hollow)), (Cavity(R=hollow), Sphere(R=R))):
-        assert pair(*bodies, d, [power(m)]).energy[0] == pytest.approx(exact, rel=1e-10)
-
-
 @pytest.mark.parametrize(("lower", "upper"), [(Sphere(R=1.0), Sphere(R=2.0)), (Sphere(R=1.0), Torus(hole=1.0, r=0.5))])
 def test_both_half_passes_have_one_energy_and_opposite_forces_where_densities_differ(lower, upper):
     """Each sums over its own surface what it feels of the other, by a rule that is no part of the program."""
@@ -82,16 +72,6 @@ def test_both_half_passes_have_one_energy_and_opposite_forces_where_densities_di
     assert energy == pytest.approx(same, rel=1e-10)
     assert force == pytest.approx(-opposite, rel=1e-10)
     assert (energy, force) == pytest.approx((whole.energy[0], whole.force_1[0, 2]), rel=1e-9)
-
-
-def test_a_sphere_over_a_plane_is_the_law_that_is_there():
-    n_1, n_2, psi_0, g_0, R, d = 2e19, 3e19, 4e-21, 3e-10, 5e-8, 4e-10
-    law = LennardJonesPair(n_1=n_1, n_2=n_2, psi_0=psi_0, g_0=g_0)
-    exact = LennardJonesSpherePlane(n_1=n_1, n_2=n_2, psi_0=psi_0, g_0=g_0, R=R, area=1.0).energy(d)
-    for bodies in ((Sphere(R=R), Plane()), (Plane(), Sphere(R=R))):
-        found = pair(*bodies, d, [law])
-        assert found.energy[0] == pytest.approx(exact, rel=1e-10)
-        assert found.force_1[0] == pytest.approx(-found.force_2[0], rel=1e-13)
 
 
 def test_cylinders_are_what_a_sum_around_both_of_them_gives():
@@ -141,21 +121,6 @@ def test_the_force_is_the_slope_of_the_energy_and_the_moment_of_its_tilt():
     assert (low.energy[0] - high.energy[0]) / (2 * h) == pytest.approx(middle.moment_1[0, 1], rel=3e-6)
 
 
-def test_each_rule_of_higher_order_gains_the_digits_that_it_should(monkeypatch):
-    exact, errors = float(closed(3.01, 1, 2, 6)), []
-    for order in (4, 6, 9, 13):
-        monkeypatch.setattr("surfacechem.surfaces.inner_sums.ORDERS", (order,) * 6)
-        monkeypatch.setattr(patches, "ORDERS", (order,) * 6)
-        table.cache_clear()
-        errors.append(abs(pair(Sphere(R=1.0), Sphere(R=2.0), 0.01, [power(6)], 1e-13).energy[0] / exact - 1))
-    table.cache_clear()
-    # Geometric convergence: the logarithm of the error falls in proportion to the order.
-    assert errors[0] < 0.05
-    for (low, high), (before, after) in zip(((4, 6), (6, 9)), itertools.pairwise(errors), strict=False):
-        assert math.log(before / after) / (high - low) > 1.0
-    assert errors[3] < 1e-9
-
-
 def test_the_local_law_errs_by_gap_over_radius_and_derjaguin_is_its_limit():
     """Also for bodies of different densities: the product counts."""
     law, bodies = power(6), (Sphere(R=1.0), Sphere(R=1.0))
@@ -168,16 +133,6 @@ def test_the_local_law_errs_by_gap_over_radius_and_derjaguin_is_its_limit():
             errors.append((local if of == "local" else derjaguin) / exact - 1)
         assert errors[0] / errors[1] == pytest.approx(10, rel=0.02)
         assert abs(errors[1]) < 2e-3
-
-
-def test_between_flats_is_the_sum_over_planes():
-    g = np.array([3e-10, 1e-9])
-    law = LennardJonesPair(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)
-    psi, traction = between_flats(law)(g).T
-    A = 2 * math.pi * 2e19 * 3e19 * 4e-21
-    x = 3e-10 / g
-    assert psi == pytest.approx(A * 9e-20 * (x**8 / 360 - x**2 / 6), rel=1e-9)
-    assert traction == pytest.approx(-A * g * (x**10 / 45 - x**4 / 3), rel=1e-12)
 
 
 def test_between_flats_ends_with_a_law():
@@ -224,19 +179,6 @@ def test_bonds_in_equilibrium_are_the_least_free_energy_and_hold_a_sphere_by_the
     R = 1e-6
     found = over_gap(Surface(Sphere(R=R)), Surface(Plane(), True, g), [density(law)])
     assert found.force_1[2] == pytest.approx(2 * math.pi * R * (law.energy(g + 2 * R) - law.energy(g)), rel=1e-10)
-
-
-def test_a_table_and_a_penalty_of_pairs_end_where_they_say():
-    distances = np.linspace(0.5, 2.0, 200)
-    table = PairTable(n_1=1.0, n_2=1.0, distances=distances, energies=[*(2 - distances[:-1]) ** 4, 0.0])
-    direct = 2 * math.pi * mpmath.quad(lambda r: (2 - r) ** 4 * r * 1, [1, 2])
-    # A small plate sees the plane as a point does.
-    found = pair(Plane(length=1e-3, width=1e-3), Plane(), 1.0, [table], 1e-6)
-    assert found.energy[0] == pytest.approx(1e-6 * float(direct), rel=1e-4)
-    penalty = PenaltyPair(n_1=1.0, n_2=1.0, k=2.0, r_0=0.5)
-    assert pair(Sphere(R=1.0), Plane(), 0.5, [penalty]).energy[0] == 0.0
-    exact = mpmath.quad(lambda z: 4 * mpmath.pi**2 * mpmath.quad(lambda r: (0.5 - r) ** 2 * r, [z, 0.5]), [0.2, 0.5])
-    assert pair(Sphere(R=1.0), Plane(), 0.2, [penalty], 1e-8).energy[0] == pytest.approx(float(exact), rel=1e-8)
 
 
 class Slow(InversePower):
@@ -288,27 +230,6 @@ def test_cylinders_that_overlap_are_seen_however_large_their_angles_are_as_numbe
     found = over_gap(lower, upper, [density(Penalty(E_n=stiffness))], rtol=1e-3)
     shallow = math.pi * math.sqrt(R * r) * depth**2 * stiffness
     assert math.isclose(-found.force_1[2], shallow, rel_tol=5 * depth / r)
-
-
-EDGED = [Cone(slope=0.3, radius=0.5), Cap(R=1.0, angle=0.3), Plane(length=1.0, width=1.0, tilt=0.2)]
-
-
-@pytest.mark.parametrize("upper", every(3, EDGED))
-def test_forces_are_the_slopes_of_energies_at_edges_and_tips(upper):
-    """Beyond an edge the distance is not along the normal; lines of action are those of the distances."""
-
-    def law(gap):
-        return np.stack([-np.exp(-5 * gap), 5 * np.exp(-5 * gap)], axis=-1)
-
-    def at(d):
-        return over_gap(Surface(Plane(length=1.5, width=1.2)), Surface(upper, True, d), [law], rtol=1e-4)
-
-    x, w = np.polynomial.legendre.leggauss(3)
-    found = [at(d) for d in 0.5 + 0.1 * x]
-    work = 0.1 * sum(w * [contact.force_1[2] for contact in found])
-    assert work == pytest.approx(at(0.6).energy - at(0.4).energy, rel=1e-3)
-    for contact in found:
-        np.testing.assert_allclose(contact.moment_1, -contact.moment_2, atol=1e-12 * np.linalg.norm(contact.force_1))
 
 
 @pytest.mark.parametrize("turned", [False, True])
