@@ -76,12 +76,8 @@ def is_array(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     system = model.system
     # A load that ends the runs must be one ramp without breakpoints.
     jumps = system.solves_jumps or (plan.load and len(problem.segments) > 2)
-    own = (
-        run.solver in (IMPLICIT, EXPLICIT)
-        and run.max_seconds is None
-        and not run.steady
-        and model.program.external is None
-    )
+    plain = run.max_seconds is None and not run.steady and model.program.external is None
+    own = plain and run.solver in (IMPLICIT, EXPLICIT)
     shared = model.passing.is_empty or not (plan.load or model.passing.reads & set(plan.paths))
     shared = shared and not set(plan.paths) & set(system.cycles)
     return own and shared and not jumps and _starts_as_given(system, set(plan.paths))

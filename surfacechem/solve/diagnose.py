@@ -47,9 +47,11 @@ RESOLVED = NEWTON_EPS
 RUNAWAY = 1e12
 """Size of a diverging state, in units of its scale."""
 
-ROUNDED_BACK = (
-    "the rates lead back from it; they are so far apart that the last digits of the fast ones have carried it there"
+LED_BACK = (
+    "the rates lead back from it; they are so far apart that the last digits of the fast ones have carried it there",
+    "the rates lead back from it; at this `rtol` steps may err by more than a bound allows for: tighten it",
 )
+"""Why a bonding variable is beyond its bound: by roundoff, or where steps may err by more than the slack of bounds."""
 
 
 EXTRAPOLATIONS = np.ldexp(1.0, np.arange(-4, 3))

@@ -30,12 +30,12 @@ from surfacechem.model.system import System
 from surfacechem.solve import AUTO, CALLING_PYTHON, EXPLICIT, method, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.contract import Array, Guard, Index, Mask, Problem, Result, Solver, States, Status, among
-from surfacechem.solve.diagnose import ROUNDED_BACK, are_led_back, closest_margin, termination
+from surfacechem.solve.diagnose import LED_BACK, are_led_back, closest_margin, termination
 from surfacechem.solve.equilibria import NO_BALANCE, Equilibria, Point
 from surfacechem.solve.hybrid import Flow, Hybrid, carried, solve_together, with_start, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent, put_rates
-from surfacechem.solve.segments import Passing
+from surfacechem.solve.segments import BETWEEN_POINTS, LARGEST_SLACK, Passing
 from surfacechem.tolerances import ATOL_OF_SCALE, DEFAULT_RTOL, EPS, FINER_BY, LINE_ERROR, SQRT_EPS
 
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
@@ -699,7 +699,7 @@ class Model:
                 margin = closest_margin(self.system, self.program, self.margins, result) or margin
             inputs = self.inputs(result, at, y, result.ydot[None])
             if are_led_back(self.system, self.program, margin, at, y, inputs[:, 1 + 2 * len(result.y) :])[0]:
-                return "failed", f"{margin.reason} at {where}: {ROUNDED_BACK}"
+                return "failed", f"{margin.reason} at {where}: {LED_BACK[BETWEEN_POINTS * run.rtol > LARGEST_SLACK]}"
             return "stopped", f"{self.system.reason(margin, inputs[0])} at {where}"
         return termination(self.system, self.program, self.margins, result, values, self.named)
 

@@ -413,11 +413,8 @@ def over_gap(
     def sizes(found: Array) -> Array:
         force, moment = (float(np.linalg.norm(found[k])) for k in (slice(1, 4), slice(7, 10)))
         force = max(force, floor[1], TINY)
-        parts = [
-            max(abs(found[0]), floor[0], force * size * NEGLIGIBLE**2),
-            *[force] * 6,
-            *[max(moment, force * size)] * 6,
-        ]
+        energy = max(abs(found[0]), floor[0], force * size * NEGLIGIBLE**2)
+        parts = [energy, *[force] * 6, *[max(moment, force * size)] * 6]
         # Where bodies just touch, the overlap is roundoff.
         area = max(abs(found[13]), SQRT_EPS * size**2) * max(1.0, AREA_ACCURACY / rtol)
         flow = max(abs(found[14]), TINY)

@@ -8,17 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mechanisms import (
-    KMOL,
-    call,
-    cantera_of,
-    load,
-    mechanism_texts,
-    partial_molar,
-    pulled,
-    states,
-    values,
-)
+from mechanisms import KMOL, call, cantera_of, load, mechanism_texts, partial_molar, pulled, states, values
 from surfacechem.mechanism import load_mechanism
 from surfacechem.quantities import AVOGADRO
 

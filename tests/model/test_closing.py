@@ -11,13 +11,7 @@ from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import CompliantDebonding, TensileStrength
 from surfacechem.laws.factors import Proportional
-from surfacechem.laws.free_energy import (
-    BondedContact,
-    BondEnergy,
-    BondStiffness,
-    LinearEnthalpy,
-    NormalStiffness,
-)
+from surfacechem.laws.free_energy import BondedContact, BondEnergy, BondStiffness, LinearEnthalpy, NormalStiffness
 from surfacechem.laws.friction import Viscous
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import (

@@ -11,13 +11,7 @@ from surfacechem.contracts.terms import Load
 from surfacechem.errors import InputError
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.free_energy import TangentialStiffness
-from surfacechem.laws.friction import (
-    AnisotropicCoulomb,
-    AnisotropicViscous,
-    Coulomb,
-    RateAndStateAging,
-    Viscous,
-)
+from surfacechem.laws.friction import AnisotropicCoulomb, AnisotropicViscous, Coulomb, RateAndStateAging, Viscous
 from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.model.assemble import assemble
 from surfacechem.scene import Mounting, Scene, Stage

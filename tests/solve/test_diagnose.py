@@ -1,5 +1,6 @@
 """What random scenes brought to light: each cause by itself, in the smallest scene that shows it."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -93,6 +94,14 @@ def test_what_is_no_number_a_little_later_is_named():
     assert beyond_numbers(system, result, inputs, lambda rows: named(rows)[:, [0, 0, 0, 3]]) is None
     result.status = Status.SINGULAR
     assert beyond_numbers(system, result, inputs, named) is None
+
+
+def test_a_bound_that_a_loose_tolerance_passes_is_not_told_to_be_passed_by_roundoff():
+    run = surfacechem.load("adiabatic-arrhenius", ["run.solver=dop853", "run.rtol=1e-2"]).run()
+    assert run.status == "failed"
+    assert re.search(
+        r"rose above its bound 1 at .*: the rates lead back from it; at this `rtol` steps may err", run.reason
+    )
 
 
 def test_a_run_that_takes_too_many_steps_says_how_many_and_what_for():
