@@ -43,7 +43,6 @@ def stored(case: str, runs: int) -> dict[str, float]:
 
     import surfacechem
     from surfacechem.runs.checking import check
-    from surfacechem.solve.lanes import lane_batch
     from surfacechem.solve.radau import stepper
 
     path, low, high, keep = SWEPT[case]
@@ -61,7 +60,7 @@ def stored(case: str, runs: int) -> dict[str, float]:
 
         return running
 
-    stepper.run, lane_batch.run = timed(stepper.run), timed(lane_batch.run)
+    stepper.Loop.run = timed(stepper.Loop.run)
     with TemporaryDirectory() as folder:
         stream = simulation.stream(simulation.plan(), Path(folder) / "o.zarr")
         stream.chunks.columns(np.arange(2))  # what is compiled when it is first needed

@@ -1,6 +1,6 @@
 """``python -m surfacechem``: the command line."""
 
-from surfacechem.cli.main import app
+from surfacechem.cli import console
 
 if __name__ == "__main__":
-    app(prog_name="surfacechem")
+    console()

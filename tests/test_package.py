@@ -83,7 +83,7 @@ print(surfacechem.run("dna-adhesive").trajectory.result.outputs.tobytes().hex())
 
 def test_wheel_has_the_command_and_the_license(wheel):
     info = {name.split(".dist-info/")[1]: name for name in wheel.namelist() if ".dist-info/" in name}
-    assert "surfacechem = surfacechem.cli:app" in wheel.read(info["entry_points.txt"]).decode()
+    assert "surfacechem = surfacechem.cli:console" in wheel.read(info["entry_points.txt"]).decode()
     assert "licenses/LICENSE" in info
     assert message_from_string(wheel.read(info["METADATA"]).decode())["Requires-Python"] == ">=3.11"
 

@@ -29,6 +29,7 @@ from surfacechem.runs.keeping import INADMISSIBLE, NO_STEADY_STATE, STATUSES, Co
 from surfacechem.solve import AUTO, EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Index
 from surfacechem.solve.lanes import lane_batch
+from surfacechem.solve.radau.stepper import Loop
 from surfacechem.solve.run import Model, Run, Trajectory
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ class ChunkRuns:
         return _runs_of, (case.name, case.text, case.mechanism_text, *self.record, self.run)
 
     @cached_property
-    def lanes(self) -> lane_batch.LaneMethod | None:
+    def lanes(self) -> Loop | None:
         """The method by which eight runs are stepped at once; None if no runs are."""
         return next((next(lane_batch.methods_of(each.problem), None) for each in self.solvers if not each.jumps), None)
 
@@ -103,7 +104,7 @@ class ChunkRuns:
     def steps(self) -> str:
         """How the runs are stepped, in words."""
         if self.lanes is not None:
-            return f"eight runs at once, by {self.lanes.words}"
+            return f"eight runs at once, by {self.lanes.title}"
         if self.arrays is None:
             return f"one run after another, each prepared in Python, by {self.run.solver}"
         return f"one run after another in the compiled loop, by {self.run.solver}"
@@ -120,7 +121,7 @@ class ChunkRuns:
     @property
     def waits(self) -> bool:
         """True if the loop that steps eight runs at once has to be compiled before the first of them."""
-        return self.lanes is not None and not self.lanes.loop.is_compiled
+        return self.lanes is not None and not self.lanes.is_compiled
 
     @cached_property
     def piece(self) -> int:

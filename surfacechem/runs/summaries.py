@@ -382,7 +382,7 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
     words = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
     facts = [
         ("swept", swept_in_words(chunks.plan, names)),
-        ("solved", _solved(chunks.model.system, chunks.run, chunks.lanes.words if chunks.lanes else "")),
+        ("solved", _solved(chunks.model.system, chunks.run, chunks.lanes.title if chunks.lanes else "")),
         ("ended", f"{ends.sum()} of {counted(chunks.plan.size, 'run')}: {words}"),
         ("error", str(checked or "")),
         ("balances", _store_balances(stream, done, checked)),

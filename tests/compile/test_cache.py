@@ -33,7 +33,7 @@ from pathlib import Path
 sys.path.insert(0, {here!r})
 from surfacechem.compile.cache import stored_code
 from surfacechem.solve.radau.stepper import Loop
-loop = Loop([Path({here!r}) / "tiny_kernel.py"], "tiny_kernel", "kernel")
+loop = Loop("tiny", [Path({here!r}) / "tiny_kernel.py"], "tiny_kernel.kernel", (), {{}})
 found = loop.is_compiled
 loop.load()(1, [])
 print("found", found, "kept", stored_code(loop.folder) is not None)
@@ -164,14 +164,14 @@ def test_what_a_wheel_carries_is_taken_where_the_processor_runs_it(kept: Path, t
     monkeypatch.setattr(kernelcache, "SHIPPED_FOLDER", tmp_path / "wheel")
     shutil.copytree(kept, kernelcache.shipped_folder(stepper.sources(), tmp_path / "wheel"))
     monkeypatch.setitem(kernelcache.PLATFORMS, platform.machine().lower(), ("new", ("instructions to come",)))
-    loop = stepper.Loop(stepper.sources(), "none", "none")
+    loop = stepper.Loop("none", stepper.sources(), "none.none", (), {})
     assert not loop.is_compiled
     monkeypatch.setitem(kernelcache.PLATFORMS, platform.machine().lower(), ("usual", ()))
     assert loop.is_compiled
     assert loop.load() is not None
     (loop.folder / CODE_FILE).write_bytes(b"damaged")
     # What is there is not written over, but made anew.
-    assert not stepper.Loop(stepper.sources(), "none", "none").is_compiled
+    assert not stepper.Loop("none", stepper.sources(), "none.none", (), {}).is_compiled
 
 
 @pytest.fixture
@@ -186,7 +186,7 @@ def cut_off(kept: Path, tmp_path: Path) -> Path:
 
 def test_code_that_is_cut_off_is_not_called_but_made_anew(cut_off: Path, monkeypatch) -> None:
     monkeypatch.setenv("SURFACECHEM_CACHE", str(cut_off.parent))
-    loop = stepper.Loop(stepper.sources(), "none", "none")
+    loop = stepper.Loop("none", stepper.sources(), "none.none", (), {})
     assert not loop.is_compiled
     with pytest.raises(ModuleNotFoundError, match="none"):  # it would be compiled
         loop.load()

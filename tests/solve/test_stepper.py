@@ -131,7 +131,7 @@ def test_rates_by_their_formula_are_those_of_the_linear_systems(monkeypatch) -> 
     program, times, y, parameters = result.problem.program, result.times, result.outputs, result.problem.parameters[0]
     solved = consistent(program, times, y, np.zeros_like(y), parameters)
     rows = np.hstack([times[:, None], y, np.full_like(y, np.nan), np.tile(parameters, (len(times), 1))])
-    monkeypatch.delattr("surfacechem.solve.radau.stepper.run")  # nothing is solved
+    monkeypatch.delattr("surfacechem.solve.radau.stepper.Loop.run")  # nothing is solved
     put_rates(program, rows)
     np.testing.assert_allclose(rows[:, 3:5], solved.ydot, rtol=4e-15)
     np.testing.assert_allclose(rows[:, 4], 2.0 * np.exp(-2.0 * times), rtol=1e-7)

@@ -43,7 +43,7 @@ class Evaluation:
     @cached_property
     def _search(self) -> Callable[[], None]:
         ends, table = self.inputs[: 2 * self.program.n + 1][None], self.parameters[None, None]
-        return stepper.repeated(search_batch(self.program, ends, table, self._counts))
+        return stepper.LOOP.repeated(search_batch(self.program, ends, table, self._counts))
 
     def put(self, t: float, differential: Array) -> bool:
         """Set time and differential variables; True if derivatives and algebraic variables were found."""
@@ -137,7 +137,7 @@ class Evaluations:
         else:
             ends, counts = rows[:, : 1 + 2 * n].copy(), np.zeros((len(rows), COLUMNS), np.int64)
             table = np.ascontiguousarray(rows[:, None, 1 + 2 * n :])
-            stepper.run(search_batch(program, ends, table, counts))
+            stepper.LOOP.run(search_batch(program, ends, table, counts))
             rows[:, : 1 + 2 * n], found = ends, counts[:, END] == 0
         if not found.all():
             lost = ~found.reshape(len(rows), -1).all(axis=1)

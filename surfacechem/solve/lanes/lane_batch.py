@@ -1,20 +1,17 @@
 """Batches of runs of one model: eight at once in lanes, and one at a time where lanes do not apply."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from surfacechem.compile.rosenbrock import MOST_NONZEROS
-from surfacechem.compile.vectors import LANES
 from surfacechem.solve.contract import Array, Problem, Status
 from surfacechem.solve.lanes.layout import EXPLICIT_MEMORY, RADAU_MEMORY, ROSENBROCK_MEMORY, SIZES
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.solver import Room, batch_of, solve_arrays
-from surfacechem.solve.radau.stepper import END
+from surfacechem.solve.radau.stepper import END, Loop
 from surfacechem.tolerances import LINEAR_RTOL
 
 
@@ -34,7 +31,7 @@ def solve_batch(problem: Problem, *columns: Array, room: Room | None = None) -> 
     return batch
 
 
-def _solved(problem: Problem, method: "LaneMethod | None", columns: Sequence[Array], room: Room | None) -> Any:
+def _solved(problem: Problem, method: Loop | None, columns: Sequence[Array], room: Room | None) -> Any:
     """Solve a batch by one method, without one run by run."""
     if method is None:
         return solve_arrays(problem, *columns, room=room)
@@ -42,53 +39,28 @@ def _solved(problem: Problem, method: "LaneMethod | None", columns: Sequence[Arr
     assert lanes is not None
     tables = problem.program.lane_tables(lanes, method is ROSENBROCK)
     batch = batch_of(problem, [*map(np.ascontiguousarray, columns)], room, tables)
-    run(batch, method)
+    method.run(batch)
     return batch
-
-
-def run(batch: Any, method: "LaneMethod") -> None:
-    """Run a batch in lanes. Each call has its own memory, so several threads may call it at the same time."""
-    words = _words_of(tuple(batch.sizes.tolist()), method)
-    memory = np.zeros(words + LANES, np.int64)
-    # A vector that lies across two lines of the cache takes twice the time.
-    first = -memory.ctypes.data // memory.itemsize % LANES
-    method.loop.load()(len(batch.counts), (*batch, memory[first : first + words]))
-
-
-@lru_cache(maxsize=64)
-def _words_of(sizes: tuple[int, ...], method: "LaneMethod") -> int:
-    """Return the number of words of memory for a block of lanes of a program of these sizes."""
-    return stepper.words_of(dict(zip(SIZES, sizes, strict=True)), method.memory)
-
-
-@dataclass(frozen=True, eq=False)
-class LaneMethod:
-    """A method of the steps in lanes."""
-
-    words: str
-    loop: stepper.Loop
-    """Its compiled loop, which is compiled when it is first needed."""
-    memory: Mapping[str, Any]
 
 
 CODE = "vectors.py", "rosenbrock.py", "rosenbrock.json"
 """Files of the room that compiles a program on which the loops depend."""
 
 
-def _method(words: str, memory: Mapping[str, Any], module: str, function: str, *parts: str) -> LaneMethod:
+def _loop(title: str, memory: Mapping[str, Any], module: str, function: str, *parts: str) -> Loop:
     here = Path(__file__).parent
     own = [here / f"{name}.py" for name in ("vector", "layout", "lane_step", "lane_guards", "lane_run", *parts)]
     sources = [*stepper.sources(), *(here.parent.parent / "compile" / name for name in CODE), *own]
-    return LaneMethod(words, stepper.Loop(sources, f"{__package__}.{module}", function), memory)
+    return Loop(title, sources, f"{__package__}.{module}.{function}", SIZES, memory)
 
 
-EXPLICIT = _method("explicit steps of order 8", EXPLICIT_MEMORY, "lane_run", "run_explicitly")
+EXPLICIT = _loop("explicit steps of order 8", EXPLICIT_MEMORY, "lane_run", "run_explicitly")
 _LINEARLY = "linearly implicit steps of order 5", ROSENBROCK_MEMORY, "rosenbrock_lanes", "run_linearly"
-ROSENBROCK = _method(*_LINEARLY, "radau_lanes", "rosenbrock_lanes")
-RADAU = _method("Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "radau_lanes")
+ROSENBROCK = _loop(*_LINEARLY, "radau_lanes", "rosenbrock_lanes")
+RADAU = _loop("Radau IIA of order 9", RADAU_MEMORY, "radau_lanes", "run_by_radau", "radau_lanes")
 
 
-def methods_of(problem: Problem) -> Iterator[LaneMethod]:
+def methods_of(problem: Problem) -> Iterator[Loop]:
     """Yield the methods of a batch in lanes, each for what those before leave; none if its runs are solved alone."""
     if problem.explicit and problem.program.lanes:
         yield EXPLICIT

@@ -149,12 +149,12 @@ def _run_one(problem: Problem, room: Room | None = None) -> Any:
     columns = y0, parameters, np.array((problem.spacing,)), _peaks(problem)[None], segments, times
     batch = batch_of(problem, columns, room or _usual_room(problem, ALONE_ROWS, ALONE_ROWS))
     if problem.max_seconds is None:
-        stepper.run(batch)
+        stepper.LOOP.run(batch)
         return batch
     timer = threading.Timer(problem.max_seconds, batch.counts[:, STOP].fill, args=(1,))
     timer.start()
     try:
-        stepper.run(batch)
+        stepper.LOOP.run(batch)
     finally:
         timer.cancel()
     return batch
@@ -238,7 +238,7 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
     segments = shared([each.segments for each in problems])
     columns = y0, parameters, spacing, peaks, segments, shared(times)
     batch = batch_of(problems[0], columns, max_steps=[each.max_steps for each in problems])
-    stepper.run(batch)
+    stepper.LOOP.run(batch)
     return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
 
 
@@ -308,7 +308,7 @@ def solve_arrays(problem: Problem, *columns: Array, room: Room | None = None) ->
     The rows of the batch are as the stepper writes them; ``room`` replaces the usual memory for each run.
     """
     batch = batch_of(problem, [*map(np.ascontiguousarray, columns)], room)
-    stepper.run(batch)
+    stepper.LOOP.run(batch)
     return batch
 
 
@@ -355,7 +355,7 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
         filled = program.filled(np.concatenate([ends, rows], axis=1))
         table = np.ascontiguousarray(filled[:, None, 1 + 2 * n :])
     counts = np.zeros((len(ends), COLUMNS), np.int64)
-    stepper.run(search_batch(program, ends, table, counts))
+    stepper.LOOP.run(search_batch(program, ends, table, counts))
     valid = (counts[:, END] == 0).reshape(shape[:-1])
     return Consistent(ends[:, 1 : 1 + n].reshape(shape), ends[:, 1 + n :].reshape(shape), valid)
 

@@ -140,6 +140,9 @@ WIDTH = 4
 ROWS = 7 + WIDTH - 1
 """Rows of a matrix of seven stages with space for the last vector, even of a single state."""
 
+CACHE_LINE = 8
+"""Number of words in a line of the processor's cache."""
+
 SCAN_POINTS = 17
 """Points of a step of the highest order at which guards are evaluated."""
 
@@ -217,55 +220,26 @@ MEMORY = {
 """Arrays that a trajectory writes to: type and shape."""
 
 
-def words_of(size_of: Mapping[str, int], memory: Mapping[str, tuple[type, tuple[str | int, ...]]]) -> int:
-    """Return the number of words of eight bytes in these arrays for these sizes."""
-    total = 0
-    for kind, shape in memory.values():
-        lengths = (size_of[length] if isinstance(length, str) else length for length in shape)
-        total += np.dtype(kind).itemsize // 8 * math.prod(lengths)
-    return total
-
-
-@lru_cache(maxsize=64)
-def _words_of(sizes: tuple[int, ...]) -> int:
-    """Return the number of words of memory for a trajectory of a program of these sizes."""
-    return words_of(dict(zip(SIZES, sizes, strict=True)), MEMORY)
-
-
-_SOURCES = (
-    "../contract",
-    "../../tolerances",
-    "stepper",
-    "work",
-    "linear",
-    "roundoff",
-    "tables",
-    "explicit",
-    "newton",
-    "step",
-    "consistency",
-    "dense",
-    "guards",
-    "outputs",
-    "../edges",
-    "driver",
-)
-
-
 def sources() -> list[Path]:
-    """Return the files that the compiled code depends on."""
+    """Return the files that the compiled code depends on: those of this folder, except the solver that calls it."""
     here = Path(__file__).parent
-    return [here / "coefficients.json", *(here / f"{name}.py" for name in _SOURCES)]
+    own = sorted({*here.glob("*.py")} - {here / "solver.py"})
+    outside = here.parent / "contract.py", here.parent / "edges.py", here.parents[1] / "tolerances.py"
+    return [*own, here / "coefficients.json", *outside]
 
 
 class Loop:
     """A compiled loop over a batch of runs: compiled once per machine, then loaded on first use.
 
+    ``sizes`` are the names of the entries of the first table of a batch, ``memory`` type and shape of each work array.
     The module of the function is imported only for compilation, as it imports Numba.
     """
 
-    def __init__(self, sources: Sequence[Path], module: str, function: str) -> None:
-        self._sources, self._module, self._function = sources, module, function
+    def __init__(
+        self, title: str, sources: Sequence[Path], function: str, sizes: Sequence[str], memory: Mapping[str, Any]
+    ) -> None:
+        self.title, self.sizes, self.memory = title, sizes, memory
+        self._sources, self._function = sources, function
         self._kernel: Kernel | None = None
         self._lock = threading.Lock()
 
@@ -289,22 +263,34 @@ class Loop:
                 if code is None:
                     from surfacechem.solve.radau.work import PARTS
 
-                    code = compile_kernel(getattr(import_module(self._module), self._function), PARTS)
+                    module, _, function = self._function.rpartition(".")
+                    code = compile_kernel(getattr(import_module(module), function), PARTS)
                     store_code(self.folder, code)
                 self._kernel = Kernel(code)
             return self._kernel
 
+    def repeated(self, batch: Any) -> Callable[[], None]:
+        """Return a function that runs a batch at each call in the same memory, with the present rows of its arrays."""
+        words = _words_of(self, tuple(batch.sizes.tolist()))
+        memory = np.zeros(words + CACHE_LINE, np.int64)
+        # A vector that lies across two lines of the cache takes twice the time.
+        first = -memory.ctypes.data // memory.itemsize % CACHE_LINE
+        return partial(self.load(), len(batch.ends), (*batch, memory[first : first + words]))
 
-LOOP = Loop(sources(), "surfacechem.solve.radau.driver", "run_batch")
+    def run(self, batch: Any) -> None:
+        """Run a batch in newly allocated memory, so that threads may run others at the same time."""
+        self.repeated(batch)()
+
+
+@lru_cache(maxsize=256)
+def _words_of(loop: Loop, sizes: tuple[int, ...]) -> int:
+    """Return the number of words of the work arrays for a program of these sizes."""
+    size_of, total = dict(zip(loop.sizes, sizes, strict=True)), 0
+    for kind, shape in loop.memory.values():
+        lengths = (size_of[length] if isinstance(length, str) else length for length in shape)
+        total += np.dtype(kind).itemsize // 8 * math.prod(lengths)
+    return total
+
+
+LOOP = Loop("Radau IIA of order 5, 9 or 13", sources(), "surfacechem.solve.radau.driver.run_batch", SIZES, MEMORY)
 """The compiled loop over runs, or over states to be made consistent."""
-
-
-def repeated(batch: Any) -> Callable[[], None]:
-    """Return a function that runs a batch at each call in the same memory, with the present contents of its rows."""
-    memory = np.zeros(_words_of(tuple(batch.sizes.tolist())), np.int64)
-    return partial(LOOP.load(), len(batch.ends), (*batch, memory))
-
-
-def run(batch: Any) -> None:
-    """Run a batch in newly allocated memory, so that threads may run others at the same time."""
-    repeated(batch)()
