@@ -174,11 +174,8 @@ def reaction(draw, names, sizes):
         "duplicate": True,
     }
     if draw(st.booleans()):
-        terms = {
-            "a": draw(number),
-            "m": draw(number),
-            "E": [1e7 * draw(number) for _ in range(draw(st.integers(1, 4)))],
-        }
+        a, m, energies = draw(number), draw(number), range(draw(st.integers(1, 4)))
+        terms = {"a": a, "m": m, "E": [1e7 * draw(number) for _ in energies]}
         entry["coverage-dependencies"] = {draw(st.sampled_from(names)): terms}
     if not reversible and draw(st.booleans()):
         entry["orders"] = {names[reactants[0]]: draw(st.sampled_from([0.5, 1.0, 2.0, 1.7]))}

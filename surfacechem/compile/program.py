@@ -93,7 +93,8 @@ class ExternalInputs:
     def __call__(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Fill the inputs, one row or many, in place."""
         rows = inputs.reshape(-1, inputs.shape[-1])
-        rows[:, self.positions] = [self.evaluate(values) for values in self.reads(rows).tolist()]
+        for row, values in zip(rows, self.reads(rows).tolist(), strict=True):
+            row[self.positions] = self.evaluate(values)
         return inputs
 
 

@@ -103,6 +103,11 @@ def test_as_if_it_were_lowered(case):
     assert evaluated.audit.violations == ()
 
 
+def test_a_run_without_an_output_asks_for_nothing(case):
+    program = surfacechem.load(case(FOREIGN)).model.program
+    assert program.filled(np.empty((0, program.n_inputs))).shape == (0, program.n_inputs)
+
+
 def test_a_compiled_solver_cannot_ask(case):
     with pytest.raises(InputError, match=r"film\.yaml:15: .*'Blowers-Masel' is not lowered.*solver: cantera"):
         surfacechem.load(case(BLOWERS_MASEL), {"run.solver": "radau"})

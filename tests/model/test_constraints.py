@@ -149,12 +149,8 @@ def test_bonds_stop_at_their_bound(c, phi_eq, start):
 @given(k=decades(11, 13), strength=decades(5, 6.3), rate=decades(-6.3, -5.7))
 def test_a_contact_bears_tension_up_to_its_strength(k, strength, rate):
     """It debonds where k w is the strength, and the energy of the spring, less that of the bonds, becomes heat."""
-    paths = {
-        "interface.limits.tensile-strength.t_max": strength,
-        "mechanics.normal.k": k,
-        "loading.w_n.ramp.rate": rate,
-    }
-    solution = run(TORN, paths)
+    paths = {"interface.limits.tensile-strength.t_max": strength, "mechanics.normal.k": k}
+    solution = run(TORN, paths | {"loading.w_n.ramp.rate": rate})
     jumps, when = solution.trajectory.jumps, strength / (k * rate)
     assert [jump.edge.name for jump in jumps] == ["debond"] * (when < 3.0)
     if jumps:

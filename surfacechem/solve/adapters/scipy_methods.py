@@ -29,9 +29,8 @@ class _Stretch(SingleSteps):
             "max_step": view.problem.spacing,
         }
         try:
-            self.solver = kind(
-                lambda since, x: view.reduced_rates(t + since, x), 0.0, y[view.differential], end - t, **options
-            )
+            start = y[view.differential]
+            self.solver = kind(lambda since, x: view.reduced_rates(t + since, x), 0.0, start, end - t, **options)
         except (ValueError, ArithmeticError) as error:
             raise StepError(str(error)) from error
 
