@@ -81,12 +81,6 @@ def species_of(mechanism):
     return mixture.species
 
 
-def loading_read(mechanism):
-    """Which loads a mechanism reads: the gap that stretches its bonds or the force that they share."""
-    formulas = [law.energy for law in mechanism.potentials] + [law.rate for law in mechanism.reactions]
-    return {name for formula in formulas for name in reads(formula)} & {"g_n", "f"}
-
-
 def values(mechanism, T, coverages, stretch=1.0, gap=0.0, force=0.0):
     """What the laws read at a temperature, coverages in the order of the species, a gap and a force that bonds
     without a spring share.

@@ -37,7 +37,6 @@ from surfacechem.laws.longrange import LennardJonesFlatFlat
 from surfacechem.scene import Body, Interface, Mounting, Scene, Stage
 
 APART = {"T_1": 300.0, "T_2": 310.0}
-TOGETHER = {"T": 300.0}
 
 
 @dataclass(frozen=True)
