@@ -190,7 +190,7 @@ class Store:
     def done(self, number: int) -> bool:
         """True if a chunk is marked, and matches its mark."""
         try:
-            return (self.marks / str(number)).read_text() == self.checksum(number)
+            return (self.marks / str(number)).read_bytes() == self.checksum(number).encode()
         except OSError:
             return False
 
