@@ -11,7 +11,7 @@ from surfacechem import format as case
 from surfacechem.contracts import fits
 from surfacechem.errors import InputError
 from surfacechem.laws.coolprop import PROPERTIES, CoolPropFluid
-from surfacechem.laws.films import Film, FilmCapacity, FilmShear, FilmWear, Roelands, Vogel
+from surfacechem.laws.films import Film, FilmCapacity, FilmShear, FilmWear, RarefiedFilm, Roelands, Vogel
 from surfacechem.laws.free_energy import Constant, ConstantInterfaceCapacity
 from surfacechem.laws.friction import Viscous
 from surfacechem.laws.loading import Hold
@@ -176,6 +176,25 @@ def test_a_sheared_film_against_couette_flow(T_1, T_2, v):
     profile = np.linspace(0.0, 1.0, 20001)
     T = T_1 + (T_2 - T_1) * profile + ETA * v**2 / (2 * K_M) * profile * (1 - profile)
     assert values["T_c"] == pytest.approx(np.trapezoid(T, profile), rel=1e-8)
+
+
+def test_heat_made_across_a_gas_passes_the_jump_at_each_wall():
+    T_1, T_2, d = 300.0, 320.0, 1e-7
+    given = {"alpha_1": 0.9, "alpha_2": 0.2}
+    scene = between_walls(T_1, T_2, 200.0, law=RarefiedFilm, given={}, **given)
+    within = dataclasses.replace(scene.interface, medium=medium("Nitrogen", 1e5, d))
+    values = steady(dataclasses.replace(scene, interface=within))
+    fluid, T_c = CoolPropFluid("Nitrogen", 1e5), values["T_c"]
+    gas = {name: float(fluid.values(name, np.array([T_c]))[0]) for name in ("k_m", "eta_m", "rho_m", "cp_m", "gamma_m")}
+    law = RarefiedFilm(between=("lower", "upper"), **given)
+    r_1, r, r_2 = law.resistances(**gas, p_m=1e5, d_m=d)
+    # T = level + slope y - heat r y^2 / 2 across the film; at each wall the flux passes the resistance of the jump.
+    heat = gas["eta_m"] * 200.0**2 / d
+    jumps = [[1.0, -r_1 / r], [1.0, 1.0 + r_2 / r]]
+    level, slope = np.linalg.solve(jumps, [T_1, T_2 + heat * (r / 2 + r_2)])
+    assert T_c == pytest.approx(level + slope / 2 - heat * r / 6, rel=1e-8)
+    assert values["q_1"] == pytest.approx(slope / r, rel=1e-6)
+    assert values["q_2"] == pytest.approx(heat - slope / r, rel=1e-6)
 
 
 @pytest.mark.parametrize("T_c", [250.0, 345.0, 700.0])

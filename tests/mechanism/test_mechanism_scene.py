@@ -84,15 +84,16 @@ def file(tmp_path_factory):
     return tmp_path_factory.mktemp("mechanisms") / "random.yaml"
 
 
-@given(data=st.data())
-@settings(max_examples=5)
-def test_random_mechanisms_in_a_scene(file, data):
+@given(data=st.data(), stretch=st.sampled_from([1.0, 1.25]))
+@settings(max_examples=8)
+def test_random_mechanisms_in_a_scene(file, data, stretch):
+    """Also on a stretched surface, where all densities are the current ones."""
     ct.suppress_thermo_warnings(True)
     file.write_text(data.draw(mechanism_texts()), encoding="utf-8")
     mechanism = load_mechanism(file)
     T, coverages = data.draw(states(len(mechanism.variables)))
     initial = {variable.name: theta for variable, theta in zip(mechanism.variables, coverages, strict=True)}
-    compare(mechanism, assemble(scene(mechanism, initial, capacity=1e6)), T, coverages)
+    compare(mechanism, assemble(scene(mechanism, initial, 1e6, stretch=stretch)), T, coverages, stretch)
 
 
 FILM = """
