@@ -71,14 +71,14 @@ reactions:
 COMPONENT = '''
 """A body that is cooled."""
 
-from surfacechem.model.balances import HEAT, OUTSIDE, Power
+from surfacechem.model.balances import HEAT, OUTSIDE, PowerFlow
 
 
 def laws(build):
     """One statement of a power: balances, ledger and entropy follow."""
     body = build.scene.bodies[0].name
     T = build.thermal.node_of[body].T
-    yield Power(HEAT, OUTSIDE, body, -1e6 + 0 * T, "H_cooled", "heat of cooling", entropy=-1e6 / T)
+    yield PowerFlow(HEAT, OUTSIDE, body, -1e6 + 0 * T, "H_cooled", "heat of cooling", entropy=-1e6 / T)
 '''
 CONSTRAINT = '''
 """The end of the track."""
@@ -174,7 +174,7 @@ PLACES = {
     ),
     "an output": Place(
         "model/components/sliding_friction.py",
-        "        yield Power(DISSIPATION, MECHANICS, INTERFACE, power, label)\n",
+        "        yield PowerFlow(DISSIPATION, MECHANICS, INTERFACE, power, label)\n",
         '        build.name(Quantity("rubbed", "W/m^2", "power of friction"), power)\n',
         CASE,
         {"rubbed": MU_P * (V_I - MU_P / M * 1e-3)},

@@ -32,7 +32,7 @@ WORK, HEAT, DISSIPATION = "work", "heat", "dissipation"
 
 
 @dataclass(frozen=True)
-class Power:
+class PowerFlow:
     """Energy that passes from one place to another, per time and reference area [W/m^2].
 
     Each process states its power once: the balances of the nodes, the ledger, the heat fluxes into the bodies and the

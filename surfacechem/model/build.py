@@ -16,7 +16,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, where, without
 from surfacechem.model import balances
 from surfacechem.model.automaton import Constraint, Edge, Equilibrium, Mode, Register
-from surfacechem.model.balances import Node, Power, Rows
+from surfacechem.model.balances import Node, PowerFlow, Rows
 from surfacechem.model.system import Account, Margin, Named, Note, Range, Role, State, definitions
 from surfacechem.model.variables import Parameters, Variables
 from surfacechem.quantities import Quantity
@@ -156,7 +156,7 @@ class Motion:
     """Rates of the gaps that move by a balance."""
 
 
-Record = Thermal | Bond | Energy | State | Account | Margin | Constraint | Equilibrium | Power | Note | str
+Record = Thermal | Bond | Energy | State | Account | Margin | Constraint | Equilibrium | PowerFlow | Note | str
 """Records that components yield; a string is a warning."""
 
 
@@ -184,7 +184,7 @@ class Build:
     rows: Rows = field(default_factory=Rows)
     ledger: list[Account] = field(default_factory=list)
     margins: list[Margin] = field(default_factory=list)
-    powers: list[Power] = field(default_factory=list)
+    powers: list[PowerFlow] = field(default_factory=list)
     """Powers between places; the ledger and the balances of energy follow from them."""
     stored: list[Expression] = field(default_factory=list)
     """Energies without a temperature, such as those of springs and charges."""
@@ -239,7 +239,7 @@ class Build:
                     Account: self.ledger,
                     Margin: self.margins,
                     Equilibrium: self.quasi_static,
-                    Power: self.powers,
+                    PowerFlow: self.powers,
                     str: self.warnings,
                 }
                 lists.get(type(record), self.notes).append(record)

@@ -15,7 +15,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.model import balances
 from surfacechem.model.automaton import Sink
-from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Node, Power
+from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Node, PowerFlow
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components.heat import receivers
 from surfacechem.model.system import Account
@@ -53,7 +53,7 @@ def energy_flows(build: Build) -> Iterator[Flow]:
 def add_record(build: Build, record: Record) -> None:
     """Keep a record; of a power also its accounts, except those of dissipation, which follow in `flows`."""
     build.add(record)
-    if isinstance(record, Power) and record.kind != DISSIPATION:
+    if isinstance(record, PowerFlow) and record.kind != DISSIPATION:
         _account(build, record)
 
 
@@ -69,7 +69,7 @@ def flows(build: Build) -> None:
             label, text = f"W_{name}", f"work done on the gap {name}"
             if name == "J_c":
                 label, text = "W_J", "work done in stretching the surface"
-            add_record(build, Power(WORK, origin, INTERFACE, work, label, text))
+            add_record(build, PowerFlow(WORK, origin, INTERFACE, work, label, text))
     for power in build.powers:
         if power.kind == DISSIPATION:
             _account(build, power)
@@ -94,7 +94,7 @@ def _rates(build: Build) -> dict[Any, Expression]:
     return rates
 
 
-def _account(build: Build, power: Power) -> None:
+def _account(build: Build, power: PowerFlow) -> None:
     """Add the accounts of a power: its supply or dissipation, and its entropy production."""
     label, produced = power.label, power.entropy
     text = power.text or label.replace("_", " ")

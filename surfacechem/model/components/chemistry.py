@@ -15,7 +15,7 @@ import symengine
 from surfacechem.contracts.terms import RateLaw
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, exponents, terms_of, where
-from surfacechem.model.balances import DISSIPATION, HEAT, INTERFACE, OUTSIDE, WORK, Power
+from surfacechem.model.balances import DISSIPATION, HEAT, INTERFACE, OUTSIDE, WORK, PowerFlow
 from surfacechem.model.build import Build
 from surfacechem.model.components.force import SHARED_LOAD
 from surfacechem.model.components.mounting import law_reads
@@ -50,7 +50,7 @@ class Reaction:
     """Net rate per current area [1/(m^2 s)]."""
 
 
-def laws(build: Build) -> Iterator[Power | Account | Caution | RatePair | Margin]:
+def laws(build: Build) -> Iterator[PowerFlow | Account | Caution | RatePair | Margin]:
     """Define chemical potentials, rates and bond balances; yield the powers of reactions."""
     yield from _beside(build)
     mu = _chemical_potentials(build)
@@ -68,12 +68,12 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | RatePair | Margin
         yield from _across_an_open_gap(build, item.law, item.rate)
         yield from own_departure(build, item.label, item.law, item.affinity)
     for account, power in dissipated.items():
-        yield Power(DISSIPATION, INTERFACE, INTERFACE, power, account)
+        yield PowerFlow(DISSIPATION, INTERFACE, INTERFACE, power, account)
     yield from _from_neighbours(build, found)
     yield from _made(build, found)
     work = symengine.Add(*(-build.stretch * item.rate * item.load for item in found))
     if work != 0:
-        yield Power(WORK, OUTSIDE, INTERFACE, work, "W_f", "work of the prescribed force on bonds")
+        yield PowerFlow(WORK, OUTSIDE, INTERFACE, work, "W_f", "work of the prescribed force on bonds")
     for pair in pairs:
         yield from departure(build, pair, {name: value + load.get(name, 0) for name, value in mu.items()})
     for name, bond in build.bonding.items():
@@ -85,7 +85,7 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | RatePair | Margin
     if "phi" not in build.bonding and depends(build.psi, phi):
         M, rate = _potential_per_area(build, "phi", phi, build.psi), build.rate_of("phi")
         if rate != 0:
-            yield Power(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
+            yield PowerFlow(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
 
 
 def _chemical_potentials(build: Build) -> dict[str, Expression]:
@@ -217,7 +217,7 @@ def _relaxation(build: Build, names: Iterable[str], law: RateLaw, rate: Expressi
     return sum((-nu * derivative(rate, bond.symbol) / bond.density for bond, nu in changes), symengine.Integer(0))
 
 
-def _from_neighbours(build: Build, found: Sequence[Reaction]) -> Iterator[Power]:
+def _from_neighbours(build: Build, found: Sequence[Reaction]) -> Iterator[PowerFlow]:
     """Yield the enthalpy and the entropy that reactions take from neighbours."""
     heat, entropy = [], []
     for item in found:
@@ -229,7 +229,7 @@ def _from_neighbours(build: Build, found: Sequence[Reaction]) -> Iterator[Power]
         text = "enthalpy of what reactions take from neighbours"
         power = build.name(Quantity("q_n", "W/m^2", text), symengine.Add(*heat))
         S = symengine.Add(*entropy) / build.variables.get("T_c", "the neighbours")
-        yield Power(HEAT, OUTSIDE, INTERFACE, power, NEIGHBOUR_HEAT, text, entropy=S)
+        yield PowerFlow(HEAT, OUTSIDE, INTERFACE, power, NEIGHBOUR_HEAT, text, entropy=S)
 
 
 def _beside(build: Build) -> Iterator[Margin]:

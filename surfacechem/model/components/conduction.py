@@ -16,14 +16,14 @@ from surfacechem.contracts.terms import Varying, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
 from surfacechem.model import balances
-from surfacechem.model.balances import HEAT, SURROUNDINGS, Node, Power
+from surfacechem.model.balances import HEAT, SURROUNDINGS, Node, PowerFlow
 from surfacechem.model.build import BOTH_BODIES, Build, Slab, Thermal
 from surfacechem.model.system import Conductor, Profile, State
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Body, Conduction, volume_shares
 
 
-def variables(build: Build) -> Iterator[Power | Thermal]:
+def variables(build: Build) -> Iterator[PowerFlow | Thermal]:
     """Divide the bodies that conduct into cells, and yield their heat fluxes."""
     thermal = build.thermal
     for number, body in enumerate(build.scene.bodies, start=1):
@@ -85,7 +85,7 @@ def _far_node(build: Build, number: int, body: Body, law: Conduction) -> Node:
     return Node(name, symengine.Symbol(name), build.slope_of(name), prescribed=True)
 
 
-def _fluxes(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Iterator[Power]:
+def _fluxes(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Iterator[PowerFlow]:
     """Yield the fluxes from node to node and through the far side."""
     name = slab.body.name
     conductivity = _conductivity(build, slab, surface.name, bound.conductivity)
@@ -101,7 +101,7 @@ def _fluxes(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Itera
     fluxes = [h * (a.T - b.T) for (a, b), h in zip(links, conductances, strict=True)]
     produced = (flux * (a.T - b.T) / (a.T * b.T) for (a, b), flux in zip(links, fluxes, strict=True))
     places = [name, *(b.name for _, b in links)]
-    flows = [Power(HEAT, a, b, flux) for (a, b), flux in zip(pairwise(places), fluxes, strict=True)]
+    flows = [PowerFlow(HEAT, a, b, flux) for (a, b), flux in zip(pairwise(places), fluxes, strict=True)]
     label, text = f"conduction_{slab.number}", f"heat conduction in {name}"
     yield replace(flows[0], label=label, text=text, entropy=symengine.Add(*produced))
     yield from flows[1:]

@@ -14,7 +14,7 @@ import symengine
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError
 from surfacechem.model import balances
-from surfacechem.model.balances import OUTSIDE, WORK, Power
+from surfacechem.model.balances import OUTSIDE, WORK, PowerFlow
 from surfacechem.model.build import Build
 from surfacechem.model.system import State
 from surfacechem.quantities import Quantity
@@ -35,7 +35,7 @@ def variables(build: Build) -> Iterator[State]:
         yield State(V, electrode.start, THERMAL_VOLTAGE)
 
 
-def laws(build: Build) -> Iterator[Power]:
+def laws(build: Build) -> Iterator[PowerFlow]:
     """Set the charging of capacitances by currents; yield the work of the charge."""
     for electrode in build.interface.electrodes:
         name, title, V = electrode.phase, electrode.title, symengine.Symbol(electrode.potential.name)
@@ -52,7 +52,7 @@ def laws(build: Build) -> Iterator[Power]:
         build.rows.kinematics(V.name, rate)
         build.store(Quantity(f"E_{name}", "J/m^2", f"energy of the charge of {title}"), energy)
         work = balances.power(energy, V, rate)
-        yield Power(WORK, OUTSIDE, ELECTRODE, work, f"W_{name}", f"work of the charge that enters {title}")
+        yield PowerFlow(WORK, OUTSIDE, ELECTRODE, work, f"W_{name}", f"work of the charge that enters {title}")
 
 
 def _path(electrode: Electrode) -> str:

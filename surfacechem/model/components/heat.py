@@ -18,7 +18,7 @@ import symengine
 from surfacechem.contracts.terms import HeatTransfer
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, where
-from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, Node, Power
+from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, Node, PowerFlow
 from surfacechem.model.build import BOTH_BODIES, Build, Record
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
@@ -47,7 +47,7 @@ def laws(build: Build) -> Iterator[Record]:
         yield Margin("partition <= 1", build.shares()[build.scene.bodies[1].name] + NO_AMOUNT, reason)
 
 
-def _external(build: Build) -> Iterator[Power]:
+def _external(build: Build) -> Iterator[PowerFlow]:
     """Yield the heat that a scene supplies to its bodies and its interface."""
     first, second = (body.name for body in build.scene.bodies)
     for member, Q in ((first, "Q_1"), (second, "Q_2"), (INTERFACE, "Q_c")):
@@ -56,7 +56,7 @@ def _external(build: Build) -> Iterator[Power]:
             # Without a medium the heat of the interface goes to the bodies.
             T = build.variables.get("T_c", "the external heat") if node is None else node.T
             text = f"external heat into {member}"
-            yield Power(HEAT, OUTSIDE, member, heat, f"H_{Q[2:]}", text, entropy=heat / T)
+            yield PowerFlow(HEAT, OUTSIDE, member, heat, f"H_{Q[2:]}", text, entropy=heat / T)
 
 
 def receivers(build: Build) -> dict[str, Expression]:
@@ -101,7 +101,7 @@ def _two_nodes(build: Build, law: HeatTransfer) -> tuple[Node, Node]:
     return first, second
 
 
-def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power]:
+def _through_film(build: Build, law: HeatTransfer) -> Iterator[PowerFlow]:
     r"""Yield the heat that a film with the mean temperature T_c gives to its walls.
 
     Across the film the temperature is a parabola on top of a line. With the resistances r of the film and :math:`r_k`
@@ -126,7 +126,7 @@ def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power]:
         text = f"heat flux from the film into {end}"
         flux = Quantity(_path_name(build, "interface", end), "W/m^2", text, tag="e:qc_k1")
         q = build.name(flux, build.stretch * (h * (centre.T - node.T) + sign * beside))
-        flows.append(Power(HEAT, INTERFACE, end, q, channels={law.channel: q}))
+        flows.append(PowerFlow(HEAT, INTERFACE, end, q, channels={law.channel: q}))
         produced += q * (centre.T - node.T) / (centre.T * node.T)
     # One account for both: a wall that takes heat from a film colder than itself takes it from the other wall, through
     # the film.
@@ -151,7 +151,7 @@ def _paths(build: Build, law: HeatTransfer) -> Iterator[tuple[tuple[str, str], d
         yield (a, b) if law.closure == "direct" else BOTH_BODIES, channels
 
 
-def _between(build: Build, ends: tuple[str, str], channels: Mapping[str, Expression]) -> Iterator[Power]:
+def _between(build: Build, ends: tuple[str, str], channels: Mapping[str, Expression]) -> Iterator[PowerFlow]:
     """Yield the power between two ends, with the flux of each channel if there are several."""
     (a, b), area = ends, _area(build, ends)
     from_node, to_node = end_node(build, a), end_node(build, b)
@@ -159,7 +159,7 @@ def _between(build: Build, ends: tuple[str, str], channels: Mapping[str, Express
     flux = Quantity(_path_name(build, a, b), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
     total, parts = _named_flux(build, flux, {channel: area * h * difference for channel, h in channels.items()})
     produced = area * symengine.Add(*channels.values()) * difference**2 / (from_node.T * to_node.T)
-    yield Power(HEAT, a, b, total, flux.name, f"heat flow from {a} to {b}", parts, produced)
+    yield PowerFlow(HEAT, a, b, total, flux.name, f"heat flow from {a} to {b}", parts, produced)
 
 
 def _named_flux(
@@ -201,7 +201,7 @@ def end_node(build: Build, end: str, law: HeatTransfer | None = None) -> Node:
     raise InputError(f"no end '{end}'.{suggestion(end, known)}", _ends(law))
 
 
-def _into_both(build: Build, channels: Mapping[str, Expression]) -> Iterator[Power | str]:
+def _into_both(build: Build, channels: Mapping[str, Expression]) -> Iterator[PowerFlow | str]:
     """Yield the mean influx q_m = h_m [T_c - 2 T_1 T_2 / (T_1 + T_2)] into both bodies."""
     bodies = [body.name for body in build.scene.bodies]
     (lower, upper), centre = (end_node(build, name) for name in bodies), end_node(build, "interface")
@@ -219,5 +219,5 @@ def _into_both(build: Build, channels: Mapping[str, Expression]) -> Iterator[Pow
         )
     produced = build.stretch * sum_h * difference**2 * (lower.T + upper.T) / (lower.T * upper.T * centre.T)
     text = "heat flow from interface to each body"
-    yield Power(HEAT, INTERFACE, bodies[0], total, flux.name, text, parts, produced)
-    yield Power(HEAT, INTERFACE, bodies[1], total, channels=parts)
+    yield PowerFlow(HEAT, INTERFACE, bodies[0], total, flux.name, text, parts, produced)
+    yield PowerFlow(HEAT, INTERFACE, bodies[1], total, channels=parts)

@@ -17,7 +17,7 @@ from surfacechem.contracts.terms import Law, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sqrt
 from surfacechem.model.automaton import ONE, Constraint, Edge, Equilibrium
-from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power, elastic_energy
+from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, PowerFlow, elastic_energy
 from surfacechem.model.build import Build
 from surfacechem.model.system import TimeScale
 from surfacechem.quantities import Quantity
@@ -185,7 +185,7 @@ class FarField:
 
     def powers(
         self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None
-    ) -> Iterator[Power | TimeScale]:
+    ) -> Iterator[PowerFlow | TimeScale]:
         """Yield the work of the far field and the dissipation of the dampers; store the energies of the bodies.
 
         An overdamped rate is computed from tractions, with their roundoff. The work is therefore done on the gap's
@@ -204,16 +204,16 @@ class FarField:
         bulk = self.w_dot - rate
         power = (self.elastic_traction(g) + self.law.c_b * bulk) * self.w_dot + self.F * moves
         if power != 0:
-            yield Power(WORK, OUTSIDE, MECHANICS, power, f"W_{axis}", f"work of the far field on the {text}")
+            yield PowerFlow(WORK, OUTSIDE, MECHANICS, power, f"W_{axis}", f"work of the far field on the {text}")
         if self.law.c_b != 0:
             damped = self.law.c_b * bulk * (self.w_dot - moves)
             label, what = f"bulk_damper_{axis}", f"the damper of the bodies, {text}"
             symbol, receivers = symengine.Symbol(f"D_{label}"), self.receivers(build)
             produced = symengine.Add(*(share * symbol / build.thermal.places[at].T for at, share in receivers.items()))
-            yield Power(DISSIPATION, MECHANICS, receivers, damped, label, what, entropy=produced)
+            yield PowerFlow(DISSIPATION, MECHANICS, receivers, damped, label, what, entropy=produced)
         if self.law.c_g != 0:
             label = build.unique(f"contact_damper_{axis}")
-            yield Power(DISSIPATION, MECHANICS, INTERFACE, self.law.c_g * rate * moves, label)
+            yield PowerFlow(DISSIPATION, MECHANICS, INTERFACE, self.law.c_g * rate * moves, label)
 
     def balance(
         self,

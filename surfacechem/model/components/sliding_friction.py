@@ -23,7 +23,7 @@ import symengine
 from surfacechem.contracts.terms import Friction, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, exp, sqrt, where
-from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power
+from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, PowerFlow
 from surfacechem.model.build import Build
 from surfacechem.model.components.formulation import displacement, evolve, in_parallel, resistance, stick_limit
 from surfacechem.model.components.mounting import ACROSS, ALONG
@@ -32,7 +32,7 @@ from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.tolerances import RELATIVE_INERTIA, TINY
 
 
-def laws(build: Build) -> Iterator[Power | State | Margin]:
+def laws(build: Build) -> Iterator[PowerFlow | State | Margin]:
     """Name the sliding tractions; yield their dissipation and the work from outside on prescribed sliding."""
     unbonded, total = build.energy.unbonded, symengine.Integer(0)
     resisting: dict[str, Expression] = {}
@@ -56,10 +56,10 @@ def laws(build: Build) -> Iterator[Power | State | Margin]:
             total += unbonded * nominal
             tractions = build.motion.sliding_tractions
             tractions[d.axis] = tractions.get(d.axis, 0) + nominal
-        yield Power(DISSIPATION, MECHANICS, INTERFACE, power, label)
+        yield PowerFlow(DISSIPATION, MECHANICS, INTERFACE, power, label)
         if not build.motion.slips:
             text = f"work done against {law.title}"
-            yield Power(WORK, OUTSIDE, MECHANICS, power, f"W_{label}", text)
+            yield PowerFlow(WORK, OUTSIDE, MECHANICS, power, f"W_{label}", text)
             for v in (d.velocity for d in resisted):
                 if build.slope_of(v) != 0 and not any(margin.name == v for margin in build.margins):
                     reason = "sliding reverses" if len(resisted) == 1 else f"{v} changes its sign"

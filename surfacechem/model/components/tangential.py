@@ -17,7 +17,7 @@ import symengine
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, norm, sign, where
 from surfacechem.model.automaton import ONE, ZERO, Constraint, Edge, Equilibrium, Mode, When
-from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, Power
+from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, PowerFlow
 from surfacechem.model.build import Build, Record
 from surfacechem.model.components import sliding_friction
 from surfacechem.model.components.formulation import (
@@ -177,7 +177,7 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
     rest = None
     if far is None:
         text = "work of the far field on the tangential displacement"
-        yield Power(WORK, OUTSIDE, MECHANICS, (carried + t_a) * rate, "W_t", text)
+        yield PowerFlow(WORK, OUTSIDE, MECHANICS, (carried + t_a) * rate, "W_t", text)
     else:
         derived = rate == symengine.Symbol("v_t") and not kind.inertial
         yield from far.powers(build, u, rate, symengine.Symbol("du_t_dt") if derived else None)

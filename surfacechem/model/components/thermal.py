@@ -12,7 +12,7 @@ from surfacechem.contracts.terms import Load, Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.model import balances
-from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, SURROUNDINGS, Node, Power
+from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, SURROUNDINGS, Node, PowerFlow
 from surfacechem.model.build import Build, Thermal
 from surfacechem.model.constraints.fold import determinant
 from surfacechem.model.system import STABLE_PREFIX, Margin, State
@@ -88,7 +88,7 @@ def _mean_temperature(build: Build) -> Expression:
     return build.name(VARIABLES["T_c"], 1 / inverse)
 
 
-def rows(build: Build) -> Iterator[Power | State | Margin]:
+def rows(build: Build) -> Iterator[PowerFlow | State | Margin]:
     """Yield states, margins and energy balances of temperatures; prescribed ones give the heat that keeps them."""
     thermal = build.thermal
     yield from (_temperature_state(build, node) for node in thermal.free)
@@ -105,7 +105,7 @@ def rows(build: Build) -> Iterator[Power | State | Margin]:
             if supply != 0:
                 text = f"heat supplied to keep {node.name}"
                 symbol = build.name(Quantity(f"Q_{node.name}", "W/m^2", text), supply)
-                yield Power(HEAT, OUTSIDE, node.name, symbol, f"H_{node.name}", text, entropy=symbol / node.T)
+                yield PowerFlow(HEAT, OUTSIDE, node.name, symbol, f"H_{node.name}", text, entropy=symbol / node.T)
         elif balances.second(node.free_energy, node.T) == 0:
             yield _fold_margin(build, node, own_rows[node.name])
         elif INTERFACE in node.energies and balances.second(build.psi, node.T) != 0:
