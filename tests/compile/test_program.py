@@ -1,5 +1,7 @@
 """Machine code from expressions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import symengine as se
@@ -105,6 +107,13 @@ def test_code_does_not_depend_on_where_a_case_lies(tmp_path, monkeypatch) -> Non
     assert surfacechem.load(tmp_path / "other.yaml").model.program.key == first
     assert surfacechem.load("dna-adhesive", ["heat.conductance.h=2 kW/m^2/K"]).model.program.key == first
     assert surfacechem.load("exothermic").model.program.key != first
+
+
+def test_a_system_with_less_in_it_is_another_one() -> None:
+    system = surfacechem.load("dna-adhesive").system
+    whole, bare = Model(system), Model(replace(system, ledger=(), named=system.named[:-1]))
+    assert (bare.program.n_ledger, bare.program.ledger) == (0, None)
+    assert bare.output_function.n_out == whole.output_function.n_out - system.named[-1].output
 
 
 def test_counts_must_agree() -> None:

@@ -9,6 +9,7 @@ import symengine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import bodies, path
+from scipy.linalg import expm
 
 import surfacechem
 from mechanisms import KMOL, mechanism_texts, pulled, states
@@ -164,3 +165,30 @@ def test_what_cantera_warns_of_is_a_warning_of_the_run(tmp_path):
     mechanism = load_mechanism(tmp_path / "broken.yaml")
     assert len(mechanism.remarks) == 3
     assert all("broken.yaml: Cantera: NasaPoly2::validate: For species" in remark for remark in mechanism.remarks)
+
+
+def test_forty_species_follow_the_exponential_of_their_matrix(tmp_path):
+    # From thirty variables on the stepper exchanges columns and passes over zeros.
+    n, draw = 40, np.random.default_rng(3)
+    pairs = [(i, (i + 1) % n) for i in range(n)] + [(i, (i + draw.integers(2, n)) % n) for i in range(n)]
+    rates = 10 ** draw.uniform(-2, 4, len(pairs))
+    entries = [
+        f"- {{equation: A{i} => A{j}, rate-constant: {{A: {k:.17g}, b: 0, Ea: 0}}}}"
+        for (i, j), k in zip(pairs, rates, strict=True)
+    ]
+    species = [f"- {{name: A{i}, composition: {{H: 1}}, thermo: {{model: constant-cp}}}}" for i in range(n)]
+    names = ", ".join(f"A{i}" for i in range(n))
+    phase = f"- {{name: s, thermo: ideal-surface, site-density: 1e-5 mol/m^2, kinetics: surface, species: [{names}]}}"
+    text = ["phases:", phase, "species:", *species, "reactions:", *entries]
+    (tmp_path / "many.yaml").write_text("\n".join(text))
+    (tmp_path / "case.yaml").write_text(
+        "bodies: {a: {temperature: 300 K}, b: {temperature: 300 K}}\n"
+        "interface: {temperature: 300 K, mechanism: {file: many.yaml}}\n"
+        "initial: {coverages: {A0: 1}}\nrun: {until: 0.1 s, outputs: 2, rtol: 1e-10}\n"
+    )
+    matrix = np.zeros((n, n))
+    for (i, j), k in zip(pairs, rates, strict=True):
+        matrix[i, i] -= k
+        matrix[j, i] += k
+    end = surfacechem.load(tmp_path / "case.yaml").run(error="balances").trajectory.result.y
+    np.testing.assert_allclose(end[:n], expm(0.1 * matrix)[:, 0], rtol=1e-9, atol=1e-14)

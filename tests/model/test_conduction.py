@@ -1,6 +1,7 @@
 """Bodies divided into cells: second order in space, exact solutions, both laws, cells by accuracy, Biot numbers."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +79,13 @@ def test_the_table_of_the_documentation():
     shown = [[float(cell) for cell in row[2::2]] for row in rows[1:]]
     np.testing.assert_allclose(shown, np.log2(table[:-1] / table[1:]), atol=6e-3)
     assert len(rows) == 3
+
+
+def test_chains_are_solved_as_the_whole_matrix_is():
+    simulation = two(20, "convective", grading=5)
+    ours = simulation.run(error="balances").trajectory.result
+    other = simulation.model.solve(replace(simulation.case.run, solver="ida", rtol=1e-9)).result
+    np.testing.assert_allclose(other.outputs, ours.outputs, rtol=2e-7)
 
 
 def test_conductivity_that_varies_with_temperature():

@@ -173,6 +173,15 @@ class TestExtremes:
 
 
 @pytest.mark.parametrize("name", ["aging-velocity-steps", "slip-velocity-steps"])
+def test_friction_jumps_by_a_and_settles_by_a_minus_b(name):
+    steps = get(name)(**ROCK, **{**STEPS, "theta_i": 10.0, "t_2": 1e3})
+    values = steps.solution([1.0, STEPS["t_1"], np.nextafter(2.0, 3.0), 900.0])
+    friction = values[f"t_{steps.law}"] / ROCK["p"]
+    ten = np.log(STEPS["v_step"] / STEPS["v_i"])
+    np.testing.assert_allclose(friction, 0.6 + np.array([0, 0, 0.01 * ten, -0.005 * ten]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["aging-velocity-steps", "slip-velocity-steps"])
 def test_extreme_slips_and_direct_effects_stay_finite(name):
     steps = get(name)(**{**ROCK, "L": 1e-12, "a": 1e-5}, **STEPS)
     values = steps.solution(np.linspace(0.0, 1e6, 50))
