@@ -80,7 +80,8 @@ def precision(dataset: Data) -> Figure:
                 for k in range(solvers):
                     cells = {each: dataset[each].values[i, k] for each in (*ERRORS, *RUN_TIMES, "status")}
                     _draw_solver(ax, cells, name, limit, *markers[k])
-                finite = dataset[name].values[i][np.isfinite(dataset[name].values[i])]
+                # The axis ends at three times the largest.
+                finite = dataset[name].values[i][np.isfinite(3 * dataset[name].values[i])]
                 if positive := finite[finite > 0].tolist():  # Matplotlib's margins of a single value may have no width
                     ax.set_xlim(max(min(positive), LEAST_ERROR) / 3, 3 * max(*positive, LEAST_ERROR))
                 if np.isfinite(limit):

@@ -364,6 +364,7 @@ def draw_curve(ax: Axes, dataset: Data, over: str, values: Array, **look: Any) -
     x, times = dataset.variables[over].values, dataset[dataset.variables[over].dims[0]].values
     leaps = np.abs(np.diff(times)) <= FLAT * np.abs(times[1:])
     if "event_verdict" in dataset and dataset["event_verdict"].dims == ("event",):
+        check_variables(dataset, {"event_time": ("event",)})
         moments = dataset["event_time"].values[dataset["event_verdict"].values != ""]
         before = np.searchsorted(times[:-1], moments[(moments >= times[0]) & (moments < times[-1])], side="right") - 1
         leaps[before] |= ~np.append(False, leaps)[before]  # unless the output is the other side of the event

@@ -103,7 +103,7 @@ def final_values(dataset: Data, name: str) -> Array:
     was refused.
     """
     ended = f"{name}_last"
-    values: Array = dataset[ended if ended in dataset else name].values
+    values: Array = dataset[ended if ended in dataset and dataset[ended].kind == "f" else name].values
     if values.ndim > len(dataset["status"].dims):
         last = values.shape[-1] - 1 - np.argmax(np.isfinite(values)[..., ::-1], axis=-1)
         values = np.take_along_axis(values, last[..., None], axis=-1)[..., 0]

@@ -323,7 +323,8 @@ def _draw_curves(ax: Axes, dataset: Data, panel: Panel, over: str) -> None:
         label = "_" if k else f"{len(rest)} smaller"
         kw = {"label": label, "marker": marker, "color": "0.75", "linewidth": 0.8, "zorder": 1}
         style.draw_curve(ax, dataset, over, dataset[names[0]].values, **kw)
-    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in dataset]
+    known = curves(dataset, *dataset.variables[over].dims)
+    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in known]
     for k, name in enumerate(exact):
         kw = {"label": "_" if k else "exact", "linestyle": DASHES, "color": "black", "linewidth": 0.9}
         style.draw_curve(ax, dataset, over, dataset[name].values, **kw)
