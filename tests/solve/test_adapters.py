@@ -11,6 +11,7 @@ from solver_problems import DY, T, Y, problem, scalar
 
 from surfacechem import load
 from surfacechem.compile.program import compile_program
+from surfacechem.errors import InputError
 from surfacechem.model.system import State
 from surfacechem.quantities import VARIABLES
 from surfacechem.results.event_table import event_times
@@ -28,6 +29,14 @@ HOPELESS = [
     ([DY - Y**2], 1.0 + 1e-5),  # it blows up at t = 1
     ([DY + Z, Z**2 + 1 + Y**2], 0.0),  # no consistent state
 ]
+
+
+@pytest.mark.parametrize("name", ["cvode", "cantera"])
+def test_a_library_that_takes_no_step_without_a_variable_says_so(name):
+    alone = problem(compile_program(T, [Z], [DZ], [], [Z - T]), [0.0], [0.0, 1.0], 1e-6)
+    with pytest.raises(InputError, match=f"{name} has nothing to integrate, since all variables follow from balances"):
+        solver(name).solve(alone)
+    assert solver("ida").solve(alone).y == pytest.approx([1.0])
 
 
 @pytest.mark.parametrize("name", names)

@@ -335,6 +335,7 @@ class CanteraSolver(SteppingSolver):
     counts_rejected = True
 
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
+        self.check(len(y[view.differential]) + bool(view.program.external))
         return _Stretch(view, t, end, y)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.errors import InputError
 from surfacechem.solve.adapters.dense_step import NODES, WEIGHTS, DenseStep, Guards, Steps, first_crossing, gained_at
 from surfacechem.solve.adapters.evaluation import Evaluation, Evaluations
 from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
@@ -146,6 +147,12 @@ class SteppingSolver(Solver):
 
     def prepare(self) -> None:
         stepper.LOOP.load()  # it finds consistent states
+
+    def check(self, count: int) -> None:
+        """Raise InputError if there is no variable to integrate, without which some libraries take no step."""
+        if count == 0:
+            message = f"{self.name} has nothing to integrate, since all variables follow from balances"
+            raise InputError(f"{message}: `radau` and `ida` step along these.", path="run.solver")
 
     @abstractmethod
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:

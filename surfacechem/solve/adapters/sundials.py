@@ -80,6 +80,7 @@ class CVODESolver(SteppingSolver):
         def jacobian(since: float, x: Array, _rates: Array, out: Array) -> None:
             out[:] = view.reduced_jacobian(t + since, x)
 
+        self.check(len(y[view.differential]))
         library = CVODE(
             rates,
             rtol=view.problem.rtol,
