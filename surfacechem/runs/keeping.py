@@ -17,6 +17,7 @@ from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import quantities
 from surfacechem.results.event_table import entropy_destroyed, events_of
 from surfacechem.solve.contract import REASONS, Status
+from surfacechem.solve.diagnose import GROWS, RUNS_AWAY
 from surfacechem.solve.radau.solver import put_rates
 from surfacechem.solve.run import Model, Trajectory
 
@@ -129,7 +130,14 @@ def reason_table(system: System) -> list[str]:
     ends = [text for margin in margins for text in (margin.reason, *(margin.below or ("", ""))[1:]) if text]
     failures = [text for status, text in REASONS.items() if not status.success]
     edges = [edge.reason for edge in system.edges]
-    return list(dict.fromkeys([REASONS[Status.FINISHED], INADMISSIBLE, *ends, *edges, *failures, OTHER_REASON]))
+    diverging = [
+        f"{name} {how}"
+        for state in system.own_states.values()
+        for name in (state.name, state.at_start[0].name)
+        for how in (RUNS_AWAY, GROWS)
+    ]
+    first = REASONS[Status.FINISHED], INADMISSIBLE
+    return list(dict.fromkeys([*first, *ends, *edges, *diverging, *failures, OTHER_REASON]))
 
 
 def variable(name: str) -> str:

@@ -47,6 +47,9 @@ RESOLVED = NEWTON_EPS
 RUNAWAY = 1e12
 """Size of a diverging state, in units of its scale."""
 
+RUNS_AWAY, GROWS = "runs away", "grows beyond all bounds"
+"""How a state diverges: ever faster, or to sizes above RUNAWAY."""
+
 LED_BACK = (
     "the rates lead back from it; they are so far apart that the last digits of the fast ones have carried it there",
     "the rates lead back from it; at this `rtol` steps may err by more than a bound allows for: tighten it",
@@ -180,7 +183,7 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
     beyond = np.abs(result.y) / np.array([state.scale for state in states])
     if np.max(beyond) > RUNAWAY:
         j = int(np.argmax(beyond))
-        return f"{states[j].name} grows beyond all bounds, to {result.y[j]:.3g} {states[j].quantity.unit}"
+        return f"{states[j].name} {GROWS}, to {result.y[j]:.3g} {states[j].quantity.unit}"
     speed = _speeds(states, result)
     j = int(np.argmax(speed))
     if not (speed[j] * result.t > 1 / IDLE and _is_faster(result, j)):
@@ -188,9 +191,9 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
     if states[j].given is not None:
         # The age of the contact diverges together with a velocity without inertia: name the velocity.
         names = [state.at_start[0].name for state in states if state.given and (state.algebraic or state is states[j])]
-        return f"{names[0]} runs away, faster and faster"
+        return f"{names[0]} {RUNS_AWAY}, faster and faster"
     unit = states[j].quantity.unit
-    return f"{states[j].name} runs away: it changes by {result.ydot[j]:.3g} {unit}/s, faster and faster"
+    return f"{states[j].name} {RUNS_AWAY}: it changes by {result.ydot[j]:.3g} {unit}/s, faster and faster"
 
 
 def swiftest(states: Sequence[State], result: Result) -> str:
