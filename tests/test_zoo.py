@@ -10,6 +10,7 @@ import equation_values
 import golden_values
 import mpmath
 import numpy as np
+import pint
 import pytest
 import symengine
 import thermodynamics as laws
@@ -18,6 +19,7 @@ from case_runs import at_even_times, load, solved
 from sampling import every
 from zoo import MEMBERS, each
 
+import surfacechem
 from surfacechem.compile.program import compile_function, compile_program
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.format import names
@@ -26,6 +28,7 @@ from surfacechem.runs.keeping import EXTREMES, SINGLE_COLUMNS, at_end, extremes
 from surfacechem.tolerances import ULPS
 
 ROOT = Path(__file__).parents[1]
+REGISTRY = pint.UnitRegistry()
 
 every_case = pytest.mark.parametrize("name", names())
 REFERENCED = [member.name for member in MEMBERS.values() if "exact" in member.tags]
@@ -200,6 +203,31 @@ def test_explicit_steps_serve_a_case_as_well(name):
     assert solution.accuracy.error < FOLDS.get(name, 1e-8 if known else 1e-7)
     assert solution.audit.energy_error < 1e-9
     assert solution.audit.violations == ()
+
+
+TIME = 1024
+"""Another unit of time in seconds, a power of two, so that nothing is rounded."""
+
+OTHERWISE = {"anisotropic-slide", "bouncing-plate", "coulomb-stop", "stick-slip", "stick-slip-debonding"} | {
+    *("stick-slip-rebonding", "compliant-debonding", "sticky-sphere", "van-der-waals-sphere"),
+    *("rate-and-state-slip-law", "rate-and-state-velocity-steps"),
+}
+"""Cases with a velocity, the least size of which is one, with the logarithm of a time, or with a table of loads."""
+
+
+@pytest.mark.around
+@pytest.mark.parametrize("name", every(3, [name for name in REFERENCED if name not in OTHERWISE]))
+def test_a_case_is_the_same_in_another_unit_of_time(name):
+    """To the last bit: no number of the code has the dimension of a time. Masses change so that energies do not."""
+    one, run, given = load(name).model, replace(load(name).case.run, picture=None), {}
+    for path, value in one.values().items():
+        unit = one.system.changeable.get(path, "1")
+        powers = {} if unit == "1" else REGISTRY.parse_expression(unit).dimensionality
+        if value and (power := powers.get("[time]", 0) + 2 * powers.get("[mass]", 0)):
+            given[path] = f"{value * TIME**power!r} {unit}"
+    slow = replace(run, times=tuple(TIME * t for t in run.times))
+    other = surfacechem.load(name, given).model.solve(slow)
+    assert np.array_equal(one.solve(run).result.outputs, other.result.outputs)
 
 
 @pytest.mark.parametrize("name", ["stick-slip", "sudden-contact", "temperature-programmed-desorption"])
