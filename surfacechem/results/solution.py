@@ -23,13 +23,16 @@ from surfacechem.results.dataset import (
 from surfacechem.results.event_table import event_columns, event_findings, event_waits
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.results.refinement import refined
-from surfacechem.solve import solver
+from surfacechem.solve import AUTO, solver
 from surfacechem.solve.contract import Status
 from surfacechem.solve.jumps import ADMISSIBLE
 from surfacechem.solve.run import Run, Trajectory
 
-RECORDED_SETTINGS = ("times", "picture", "atol", "max_steps")
+RECORDED_SETTINGS: tuple[str, ...] = ("times", "picture", "atol", "max_steps")
 """Settings of a run that a dataset records if they differ from those of its case; others are attributes."""
+
+ASKED_SETTINGS = ("solver", "accuracy", "rtol")
+"""Those from which solver and tolerances of a run follow that are chosen for an accuracy."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,8 @@ class Solution(Results):
     """Function that finds the error of the run."""
     case_run: Run | None = None
     """Run settings of the case; the dataset records those that differ."""
+    asked: Run | None = None
+    """Run settings that were asked for; where an accuracy was, those of the run follow from these."""
     surface: Any = None
     """Free energy of two curved surfaces, if the scene has any."""
     error_from: str = "auto"
@@ -217,10 +222,12 @@ class Solution(Results):
 
     def _departures(self) -> dict[str, str]:
         """Return the settings in which the run differs from its case, for running it again."""
-        run = self.trajectory.run
         departures = self._changed(self.trajectory.model.system)
         if self.case_run is not None:
-            now, usual = ({name: getattr(r, name) for name in RECORDED_SETTINGS} for r in (run, self.case_run))
+            run, names = self.trajectory.run, RECORDED_SETTINGS
+            if self.asked and AUTO in (self.asked.solver, self.case_run.solver):
+                run, names = self.asked, RECORDED_SETTINGS + ASKED_SETTINGS
+            now, usual = ({name: getattr(r, name) for name in names} for r in (run, self.case_run))
             departures |= {name: value for name, value in now.items() if value != usual[name]}
         if self.error_from != "auto":
             departures["error"] = self.error_from

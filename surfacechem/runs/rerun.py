@@ -17,7 +17,7 @@ from surfacechem import solve as solvers
 from surfacechem.errors import InputError, Place
 from surfacechem.format.plans import recorded_plan
 from surfacechem.results.netcdf import Column, dataset_path, reading, save_kept
-from surfacechem.results.solution import RECORDED_SETTINGS, Solution
+from surfacechem.results.solution import ASKED_SETTINGS, RECORDED_SETTINGS, Solution
 from surfacechem.runs.checking import check
 from surfacechem.runs.simulation import Simulation
 from surfacechem.runs.sweeps import SweepSolution
@@ -35,6 +35,9 @@ DEPARTURE_TYPES: Mapping[str, tuple[type, ...]] = {
     "picture": (float, type(None)),
     "atol": (float, int, type(None)),
     "max_steps": (int,),
+    "solver": (str,),
+    "accuracy": (float, type(None)),
+    "rtol": (float,),
     "error": (str,),
 }
 """Settings, with their types, that a file may record as different from those of its case."""
@@ -126,14 +129,15 @@ def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolut
     if "keep" in record.attributes:
         return KeptSweep.of(record, case)
     departures = _departures(record)
-    solver, rtol = record.attribute("solver", str), record.attribute("rtol", float)
-    if solver not in solvers.names:
-        raise record.error(f"no run is made with the solver '{solver}'.")
+    made: dict[str, Any] = {"solver": record.attribute("solver", str), "rtol": record.attribute("rtol", float)}
     try:
-        usual = case.run
-        settings = {name: departures.get(name, getattr(usual, name)) for name in RECORDED_SETTINGS}
         # A limit of wall-clock time is not reproducible.
-        run = replace(usual, solver=solver, rtol=rtol, max_seconds=None, **settings)
+        asked = {name: departures[name] for name in RECORDED_SETTINGS + ASKED_SETTINGS if name in departures}
+        run = replace(case.run, max_seconds=None, **asked)
+        if run.solver != solvers.AUTO:  # what an accuracy took, it takes again
+            run = replace(run, **made)
+        if run.solver not in (*solvers.names, solvers.AUTO):
+            raise InputError(f"no run is made with the solver '{run.solver}'.")
         plan = recorded_plan(record.attribute("sweep", str)) if "sweep" in record.attributes else None
     except InputError as error:
         raise error.at(record.place) from None
@@ -153,7 +157,7 @@ def _departures(record: Record) -> Mapping[str, Any]:
     if not isinstance(found, dict) or any(not isinstance(found[k], DEPARTURE_TYPES.get(k, ())) for k in found):
         raise record.error(f"the attribute 'departures' may hold {', '.join(DEPARTURE_TYPES)}, each of its kind.")
     numbers = [*found.get("times", []), *found.get("changes", {}).values(), found.get("max_steps", 1)]
-    numbers += [found["picture"]] if found.get("picture") is not None else []
+    numbers += [found[name] for name in ("picture", "accuracy", "rtol") if found.get(name) is not None]
     if not all(isinstance(value, float | int) and math.isfinite(value) for value in numbers):
         raise record.error("the attribute 'departures' holds what is no number where one is needed.")
     return found | ({"times": tuple(found["times"])} if "times" in found else {})

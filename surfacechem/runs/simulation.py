@@ -275,6 +275,7 @@ class Simulation:
             trajectory,
             judge=judged,
             case_run=case.run,
+            asked=settings,
             surface=case.scene.surface,
             error_from=error,
             **chosen._origin(values),

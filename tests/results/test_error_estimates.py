@@ -23,6 +23,7 @@ from surfacechem.results.error_estimates import (
     with_cells,
 )
 from surfacechem.results.event_table import event_times
+from surfacechem.runs import rerun
 from surfacechem.runs.summaries import run_summary, sweep_summary
 from surfacechem.tolerances import EPS
 
@@ -79,6 +80,21 @@ def test_the_summary_says_where_the_error_is_from(way, words, tmp_path):
     assert words in line
     again = CliRunner().invoke(app, ["rerun", str(target)])
     assert again.exit_code == 0, again.output
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("cohesive-cycles", {}),
+        ("cohesive-cycles", {"accuracy": 1e-6, "rtol": 1e-8}),
+        ("cohesive-cycles", {"accuracy": None, "solver": "radau", "rtol": 1e-6}),
+        ("exothermic", {"accuracy": 1e-6, "solver": "auto", "rtol": 1e-8}),
+    ],
+)
+def test_what_was_asked_for_is_asked_for_again(name, changes, tmp_path):
+    case = surfacechem.load(name)
+    record = rerun.read(case.run(run=replace(case.case.run, **changes)).write(tmp_path / "run.nc"))
+    assert rerun.differences(record, rerun.run_again(record)) == []
 
 
 def test_another_source_is_refused_before_anything_is_computed():
