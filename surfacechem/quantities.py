@@ -10,7 +10,7 @@ Source of tags: the equation labels of Sauer, Duong & Mandadapu (2021), doi 10.1
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
 BOLTZMANN = 1.380649e-23
 """Boltzmann constant [J/K] (exact, SI 2019)."""
@@ -31,8 +31,7 @@ STEFAN_BOLTZMANN = 5.670374419e-8
 """Stefan-Boltzmann constant [W/(m^2 K^4)] (SI 2019, rounded)."""
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(NamedTuple):
     """A named quantity: SI unit, long name, LaTeX symbol and the tag of its equation in the paper."""
 
     name: str

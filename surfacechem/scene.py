@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,7 @@ MOST_CELLS = 4096
 """Largest number of cells across a body that a case may give."""
 
 
-@dataclass(frozen=True)
-class Body:
+class Body(NamedTuple):
     """One of the two bodies.
 
     ``temperature`` is the name of the body's temperature node, or a prescribed history; bodies and interface that share
@@ -123,8 +122,7 @@ class Mounting(Law):
     )
 
 
-@dataclass(frozen=True)
-class Stage:
+class Stage(NamedTuple):
     """A stage of the loading: rates of the variables that it moves, and the condition that ends it, if any.
 
     ``event`` is the name of a transition, or its beginning; ``variable`` ends the stage at ``value``. Only the last
@@ -132,7 +130,7 @@ class Stage:
     """
 
     name: str
-    rates: Mapping[str, float] = field(default_factory=dict)
+    rates: Mapping[str, float] = {}
     """Rates by variable, in its unit per second."""
     duration: float | None = None
     """Length [s]."""
@@ -170,8 +168,7 @@ class Sites:
         return min(self.density_1, self.density_2) / self.density
 
 
-@dataclass(frozen=True)
-class BondingVariable:
+class BondingVariable(NamedTuple):
     """A bonding variable other than phi, such as a coverage of a mechanism.
 
     ``density`` is the amount per reference area [1/m^2] at which the variable is one.
@@ -184,8 +181,7 @@ class BondingVariable:
     """Name in the mechanism."""
 
 
-@dataclass(frozen=True)
-class Electrode:
+class Electrode(NamedTuple):
     """A phase next to the surface whose potential follows from its charge."""
 
     phase: str
@@ -242,8 +238,7 @@ class Engine(Protocol):
         """Return values of the parameters at values of the variables."""
 
 
-@dataclass(frozen=True)
-class Medium:
+class Medium(NamedTuple):
     """Medium between the bodies: a fluid, or single properties by name (k_m, eta_m, rho_m, cp_m).
 
     A given property replaces that of the fluid. Without ``thickness`` [m] the medium fills the normal gap, or is a film
@@ -252,7 +247,7 @@ class Medium:
     """
 
     fluid: Fluid | None = None
-    properties: Mapping[str, float | Property] = field(default_factory=dict)
+    properties: Mapping[str, float | Property] = {}
     thickness: float | None = None
     temperatures: tuple[float, ...] = ()
     growth: Sequence[FilmGrowth] = ()

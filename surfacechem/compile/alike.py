@@ -10,10 +10,10 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import symengine
@@ -40,8 +40,7 @@ _LOOP_WORDS = 5
 """Words of a loop: number of cases, and the tables of shared inputs, own inputs, numbers and results."""
 
 
-@dataclass(frozen=True)
-class Form:
+class Form(NamedTuple):
     """Functions of the inputs shared by all cases of a loop, of the own inputs of each case, and of its numbers."""
 
     expressions: tuple[Any, ...]
@@ -90,7 +89,7 @@ class FormLoop:
         by = {k: slope for k, slope in by.items() if slope != 0}
         cases = zip(np.array(self.own).reshape(self.count, -1).tolist(), self.places, strict=True)
         found = [places[i, (own + shared)[k]] for own, i in cases for k in by]
-        return FormLoop(replace(self.form, expressions=tuple(by.values())), self.own, self.numbers, found)
+        return FormLoop(self.form._replace(expressions=tuple(by.values())), self.own, self.numbers, found)
 
 
 FormMatch = tuple[str, tuple[int, ...], tuple[float, ...]]

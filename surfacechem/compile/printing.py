@@ -11,10 +11,10 @@ from __future__ import annotations
 import linecache
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import symengine
 import sympy  # type: ignore[import-untyped]
@@ -31,8 +31,7 @@ CODE_WIDTH = 100
 """Width of printed lines; longer ones are broken where an expression permits."""
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """A line of a printed function: a local name, its expression and its meaning."""
 
     name: str

@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 import symengine
@@ -81,8 +81,7 @@ class Function:
         return C_FUNCTION(self.address), ctypes.c_double * self.n_in, ctypes.c_double * self.n_out
 
 
-@dataclass(frozen=True)
-class ExternalInputs:
+class ExternalInputs(NamedTuple):
     """Parameters that an external function computes from values at the inputs, and writes to them."""
 
     reads: Function
@@ -137,8 +136,7 @@ class Lanes:
         return compile_step(self.states, self.slopes, self.nonzeros)
 
 
-@dataclass(frozen=True)
-class Chain:
+class Chain(NamedTuple):
     """States from ``first`` to before ``end``, each coupled only to its neighbours, the first one to ``anchor``.
 
     The anchor is a state before all chains; -1 if there is none.

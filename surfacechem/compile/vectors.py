@@ -11,11 +11,10 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from functools import reduce
 from math import factorial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import symengine
@@ -39,8 +38,7 @@ INTEGERS: Any = ir.VectorType(ir.IntType(64), LANES)
 _POINTER = ir.IntType(8).as_pointer()
 
 
-@dataclass(frozen=True)
-class LaneFunction:
+class LaneFunction(NamedTuple):
     """Machine code for eight cases at once.
 
     Its C signature is ``void f(double *out, const double *inputs, void *user)``, with inputs [input, case] and results

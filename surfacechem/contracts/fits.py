@@ -7,7 +7,7 @@ long as possible, so that kinks lie between them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -39,8 +39,7 @@ class NoFitError(ValueError):
     """The function has no piecewise polynomial of the required accuracy."""
 
 
-@dataclass(frozen=True)
-class Piece:
+class Piece(NamedTuple):
     """A polynomial on low <= T <= high; its coefficients are those of powers of x = (2 T - low - high)/(high - low)."""
 
     low: float

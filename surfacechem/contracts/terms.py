@@ -35,7 +35,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self, dataclass_transform
 
 from surfacechem.contracts.units import quotient
 from surfacechem.errors import InputError, Place
@@ -45,8 +45,7 @@ if TYPE_CHECKING:
     from surfacechem.contracts.fits import Piece
 
 
-@dataclass(frozen=True)
-class Spec:
+class Spec(NamedTuple):
     """Specification of a parameter: unit ("[x]" is the unit of the loaded quantity), meaning and allowed range.
 
     ``stretch`` is the power of the area stretch J_c that multiplies the given value in the formula: -1 if the value is
@@ -81,7 +80,7 @@ class Spec:
 
 @lru_cache(maxsize=1024)  # asked for each entry of a list
 def _resolved(spec: Spec, x: str) -> Spec:
-    return dataclasses.replace(spec, unit=resolved_unit(spec.unit, x))
+    return spec._replace(unit=resolved_unit(spec.unit, x))
 
 
 def resolved_unit(unit: str, x: str) -> str:
@@ -279,8 +278,7 @@ class Law(ABC):
         return bound
 
 
-@dataclass(frozen=True)
-class Varying:
+class Varying(NamedTuple):
     """A parameter that depends on variables: a value at the reference state times factors."""
 
     value: float
@@ -407,8 +405,7 @@ class Friction(Law):
         return hasattr(self, "limit")
 
 
-@dataclass(frozen=True)
-class RateType:
+class RateType(NamedTuple):
     """A rate type of mechanisms by which a law modifies an Arrhenius coefficient."""
 
     name: str
@@ -416,13 +413,13 @@ class RateType:
     method: str
     """Method of the law: the logarithm of a factor of the coefficient, or a method that REACTIONS in
     :mod:`surfacechem.mechanism.rates` requires."""
-    constants: Mapping[str, float] = field(default_factory=dict)
+    constants: Mapping[str, float] = {}
     """Rate constants of the law: one for the constant that the Arrhenius coefficient replaces, zero for its reverse."""
     names: tuple[str, ...] = ()
     """Parameters of the law that a reaction has by the same names, with the same defaults."""
-    renamed: Mapping[str, str] = field(default_factory=dict)
+    renamed: Mapping[str, str] = {}
     """Parameters that every reaction gives under other names, each with its name in the law."""
-    ratios: Mapping[str, str] = field(default_factory=dict)
+    ratios: Mapping[str, str] = {}
     """Rate constants, as ratios to the Arrhenius coefficient, by their names in a reaction, with those in the law."""
     distance: str = ""
     """Parameter of the law whose work against the force per bond is the whole factor, if that is so."""
@@ -660,8 +657,7 @@ class PairEnergy(Law):
     energy: ClassVar[Callable[..., Expression]]
 
 
-@dataclass(frozen=True)
-class FluidRange:
+class FluidRange(NamedTuple):
     """Temperatures [K] between which a fluid keeps its phase, with reasons for both ends."""
 
     low: float

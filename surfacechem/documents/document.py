@@ -13,11 +13,11 @@ import json
 import re
 import sys
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import StringIO
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 
@@ -25,8 +25,7 @@ from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 MOST_NESTED = 24
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(NamedTuple):
     """Limits on the size of a document."""
 
     largest: int = 1_000_000
@@ -48,8 +47,7 @@ _NOT_FINITE = {".inf": "inf", "+.inf": "inf", "-.inf": "-inf", ".nan": "nan"}
 _SCALAR_WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
 
 
-@dataclass(frozen=True)
-class Tree:
+class Tree(NamedTuple):
     """A value and its place: a scalar, a list of trees or a mapping of trees."""
 
     value: Any
@@ -296,7 +294,7 @@ class _Builder:
             self.count += size  # repeated values count like written ones
             if self.count > self.most:
                 raise InputError(f"aliases repeat more than {self.most} values.", place)
-            return replace(known, place=place)
+            return known._replace(place=place)
         if kind == "ScalarEvent":
             tree = Tree(scalar(event.value) if event.implicit[0] else event.value, place)
         elif kind == "SequenceStartEvent":
@@ -319,7 +317,7 @@ class _Builder:
             if event.value in result:
                 first = result[event.value].place.line
                 raise InputError(f"the key '{event.value}' is given twice, first in line {first}.", place)
-            result[event.value] = replace(self._value(next(self.events), depth + 1), place=place)
+            result[event.value] = self._value(next(self.events), depth + 1)._replace(place=place)
         return result
 
 
@@ -461,7 +459,7 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
     if not keys:  # a number for a varying parameter keeps its factors
         varies = isinstance(tree.value, dict) and {"value", "times"} >= set(tree.value) >= {"value"}
         bare = not isinstance(new.value, dict | list)
-        return replace(tree, value={**tree.value, "value": new}) if varies and bare else new
+        return tree._replace(value={**tree.value, "value": new}) if varies and bare else new
     if isinstance(tree.value, list):
         return _set_item(tree, keys, new, place)
     (first, *rest), removes = keys, len(keys) == 1 and new.value in EMPTY_VALUES
@@ -469,11 +467,11 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         return new  # a value without key is, for example, the level of a constant history
     known = _entries(tree, place)
     if not removes:
-        return replace(tree, value={**known, first: _set(known.get(first, Tree(None, place)), rest, new, place)})
+        return tree._replace(value={**known, first: _set(known.get(first, Tree(None, place)), rest, new, place)})
     refuse_unknown([first], known, "there is no '{}' to remove", place)
     kept = dict(known)
     del kept[first]
-    return replace(tree, value=kept)
+    return tree._replace(value=kept)
 
 
 def _entries(tree: Tree, place: Place) -> Mapping[str, Tree]:
@@ -495,5 +493,5 @@ def _set_item(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
     if len(keys) > 1:
         whole = item.value if isinstance(item.value, dict) else {item.value: Tree(None, item.place)}
         ((name, inner),) = whole.items()
-        changed = [replace(item, value={name: _set(inner, keys[1:], new, place)})]
-    return replace(tree, value=[*tree.value[:index], *changed, *tree.value[index + 1 :]])
+        changed = [item._replace(value={name: _set(inner, keys[1:], new, place)})]
+    return tree._replace(value=[*tree.value[:index], *changed, *tree.value[index + 1 :]])

@@ -16,7 +16,7 @@ import sys
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from io import BufferedIOBase, TextIOBase
 from pathlib import Path
@@ -75,7 +75,7 @@ def with_own_laws(tree: Tree, base: Path, allow_code: bool = False) -> tuple[Tre
         found += read_laws(source, name, entry.place)
         texts = {"file": name, "sha256": checksum, "python": source}
         entries.append(Tree({key: Tree(text, entry.place) for key, text in texts.items()}, entry.place))
-    return replace(tree, value={**tree.value, "laws": replace(given, value=entries)}), found
+    return tree._replace(value={**tree.value, "laws": given._replace(value=entries)}), found
 
 
 def read_laws(source: str, name: str, place: Place | None = None) -> Sequence[type[Law]]:
@@ -258,7 +258,7 @@ def _without_stale_reference(before: Tree, after: Tree) -> tuple[Tree, str]:
     found = exact_solution_of(after.value["reference"]) if "reference" in new else None
     if found is None or not found.fixed:
         return after, ""
-    return replace(after, value={key: child for key, child in after.value.items() if key != "reference"}), found.fixed
+    return after._replace(value={key: child for key, child in after.value.items() if key != "reference"}), found.fixed
 
 
 def names() -> list[str]:

@@ -30,14 +30,14 @@ def with_files(tree: Tree, base: str) -> Tree:
     read again without the files.
     """
     if isinstance(tree.value, list):
-        return replace(tree, value=[with_files(child, base) for child in tree.value])
+        return tree._replace(value=[with_files(child, base) for child in tree.value])
     if not isinstance(tree.value, dict):
         return tree
     values = {key: with_files(child, base) for key, child in tree.value.items()}
     for key, contents in (("table", _text), ("heights", _numbers)):
         if key in values and isinstance(values[key].value, dict) and "file" in values[key].value:
             values[key] = contents(values[key], base)
-    return replace(tree, value=values)
+    return tree._replace(value=values)
 
 
 def _text(tree: Tree, base: str) -> Tree:
@@ -46,7 +46,7 @@ def _text(tree: Tree, base: str) -> Tree:
     if "csv" in fields:
         raise fields["csv"].error("the table has two roles: give `file` or `csv`.")
     path = document.named(fields.pop("file"), base, "the file of a table")
-    return replace(tree, value={"csv": Tree(document.read(path), Place(str(path))), **fields})
+    return tree._replace(value={"csv": Tree(document.read(path), Place(str(path))), **fields})
 
 
 def table(tree: Tree, unit: str) -> Table | None:
@@ -155,7 +155,7 @@ def _numbers(tree: Tree, base: str) -> Tree:
     numbers = from_netcdf(path) if path.suffix == NETCDF else from_csv(Tree(document.read(path), place))
     # Errors of the numbers, coordinates that do not increase for instance, are reported for the file.
     found = {axis: Tree([Tree(value, place) for value in values], place) for axis, values in numbers.items()}
-    return replace(tree, value=found)
+    return tree._replace(value=found)
 
 
 def from_csv(content: Tree) -> Numbers:

@@ -21,10 +21,10 @@ import typing
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import MISSING, dataclass, field, replace
+from dataclasses import MISSING, dataclass, field
 from functools import cache
 from types import MappingProxyType
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from surfacechem import laws
 from surfacechem.contracts.terms import Factor, Law, Load, Spec, Varying, resolved_unit
@@ -55,11 +55,10 @@ DIFFERENCES = ("amplitude",)
 UNITS = {name: variable.unit for name, variable in VARIABLES.items() if name not in INTERNAL}
 
 
-@dataclass(frozen=True)
-class Context:
+class Context(NamedTuple):
     """Names that a case has given, to which its other sections may refer."""
 
-    units: Mapping[str, str] = field(default_factory=lambda: UNITS)
+    units: Mapping[str, str] = UNITS
     """Unit of each variable."""
     temperatures: Sequence[str] = ()
     bodies: Sequence[str] = ()
@@ -105,7 +104,7 @@ class Number(Content):
             raise tree.error(f"{self.wanted}, not {tree.shown}.")
         spec = self.spec.resolved(context.x)
         if context.whole:
-            spec = replace(spec, unit=TOTAL_UNITS.get(spec.unit, spec.unit))
+            spec = spec._replace(unit=TOTAL_UNITS.get(spec.unit, spec.unit))
         if not (isinstance(tree.value, dict) and "value" in tree.value):
             return number(tree, spec, name, difference=self.difference)
         if not spec.varies:
@@ -281,7 +280,7 @@ class Prescribed(Content):
         unit = resolved_unit(self.unit, context.x)
         load: Load | None = data_files.table(tree, unit)
         if load is None and isinstance(tree.value, dict):
-            load = OneLaw(Load).read(tree, name, replace(context, x=unit))
+            load = OneLaw(Load).read(tree, name, context._replace(x=unit))
         elif load is None:
             try:
                 level = number(tree, Spec(unit, name), name)
@@ -331,7 +330,7 @@ class Nested(Content):
 
     def read(self, tree: Tree, name: str, context: Context) -> Any:
         """Return the section or the law."""
-        context = replace(context, whole=False) if self.per_area else context
+        context = context._replace(whole=False) if self.per_area else context
         return read(self.cls, tree, context) if issubclass(self.cls, Section) else read_law(self.cls, tree, context)
 
     def schema(self) -> Schema:
@@ -374,7 +373,7 @@ class Entries(Content):
             if content is None or (known is not None and key not in known):
                 found[key] = math.nan  # the scene refuses it with a better message
             else:
-                found[key] = content.read(child, key, replace(context, x=units.get(key, "1")))
+                found[key] = content.read(child, key, context._replace(x=units.get(key, "1")))
         return found
 
     def _check_count(self, tree: Tree) -> None:
@@ -592,7 +591,7 @@ def read_law(law: type[L], tree: Tree, context: Context) -> L:
     """Read a law from the mapping of its parameters."""
     if issubclass(law, Factor):
         of = tree.mapping().get("of", Tree(law_keys(law)["of"].default, tree.place))
-        context = replace(context, x=context.units[of.choice("variable", context.units)])
+        context = context._replace(x=context.units[of.choice("variable", context.units)])
     # Errors of the law as a whole are those of an entry set from outside, else its own.
     entries = tree.value.values() if isinstance(tree.value, dict) else ()
     with placed(next((entry.place for entry in entries if entry.place.file == OVERRIDE), tree.place)):

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,8 +72,7 @@ def _standard_normal(u: Array) -> Array:
     return np.asarray(ndtri(u))
 
 
-@dataclass(frozen=True)
-class Distribution:
+class Distribution(NamedTuple):
     """Probability distribution of the value of a parameter: its kind, with the numbers that belong to it."""
 
     kind: str
@@ -99,8 +98,7 @@ class Distribution:
         return {"kind": self.kind, **self.numbers}
 
 
-@dataclass(frozen=True)
-class Sample:
+class Sample(NamedTuple):
     """A number of draws of parameters by path, as functions of the index of a run, the method and the seed."""
 
     draws: Mapping[str, Distribution]
@@ -510,7 +508,7 @@ def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:
         for name in keys(SweepSection):
             if not section.has(name):
                 setattr(section, name, getattr(usual, name))
-        section.tree = replace(section.tree, value={**usual.tree.mapping(), **section.tree.mapping()})
+        section.tree = section.tree._replace(value={**usual.tree.mapping(), **section.tree.mapping()})
     return section
 
 

@@ -6,10 +6,10 @@ import math
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from surfacechem import solve as solvers
 from surfacechem.contracts.terms import Law, Load, Property
@@ -66,12 +66,11 @@ KEYS_OF_FLATS = ("sites", "bonding", "mechanism", "friction")
 DEFAULT_CELLS = 16
 
 
-@dataclass(frozen=True)
-class ExactSolution:
+class ExactSolution(NamedTuple):
     """An exact solution by name, with the parameters that the case gives for it."""
 
     name: str
-    options: Mapping[str, float] = field(default_factory=dict)
+    options: Mapping[str, float] = {}
     place: Place | None = None
 
     @property
@@ -109,7 +108,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
         evaluate = run.solver in (solvers.AUTO, *solvers.CALLING_PYTHON)
         mechanism = _mechanism(named, interface["mechanism"], Path(base), mechanism_text, evaluate)
         coverages = (variable.name for variable in mechanism.variables)
-        context = replace(context, units={**context.units, **dict.fromkeys(coverages, "1")})
+        context = context._replace(units={**context.units, **dict.fromkeys(coverages, "1")})
     return read(Document, tree, context), mechanism
 
 
@@ -385,14 +384,14 @@ def _stage(name: str, section: StageSection) -> Stage:
     if section.has("for") and section.has("until"):
         raise section.error("the stage has two ends: give `for` or `until`.", "until", "for")
     if not isinstance(until, Mapping):
-        return replace(stage, duration=section.duration, event=until or "")
+        return stage._replace(duration=section.duration, event=until or "")
     ((variable, value),) = until.items()
     if not isinstance(value, Threshold):
-        return replace(stage, variable=variable, value=value)
+        return stage._replace(variable=variable, value=value)
     ends = [end for end in (value.rises_to, value.falls_to) if end is not None]
     if len(ends) != 1:
         raise value.error("give `rises-to` or `falls-to`.")
-    return replace(stage, variable=variable, value=ends[0], rising=value.falls_to is None)
+    return stage._replace(variable=variable, value=ends[0], rising=value.falls_to is None)
 
 
 def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
@@ -450,11 +449,11 @@ def _renumbered(mechanism: Mechanism, species: Tree | None, reactions: Tree | No
             return law.bind({"species": tuple(known[item.name] for item in vars(law)["species"])})
 
         laws = tuple(renewed(law) for law in mechanism.reactions)
-        mechanism = replace(mechanism, potentials=(renewed(mixture),), reactions=laws)
+        mechanism = mechanism._replace(potentials=(renewed(mixture),), reactions=laws)
     if reactions is not None:
         given = reactions.mapping([law.label for law in mechanism.reactions], "reactions")
         laws = tuple(_changed(law, given[law.label]) if law.label in given else law for law in mechanism.reactions)
-        mechanism = replace(mechanism, reactions=laws)
+        mechanism = mechanism._replace(reactions=laws)
     return mechanism
 
 
@@ -467,10 +466,10 @@ def _species(item: Species, tree: Tree) -> Species:
 
     def renewed(law: L, part: Tree | None = None) -> L:
         inner = {key: child for key, child in fields.items() if keys.get(key) is law}
-        return _changed(law, part or replace(tree, value=inner))
+        return _changed(law, part or tree._replace(value=inner))
 
     forms = [renewed(form, fields.get(key)) for key, form in ranges.items()]
-    return replace(item, gibbs=item.gibbs.with_forms(forms), spring=item.spring and renewed(item.spring))
+    return item._replace(gibbs=item.gibbs.with_forms(forms), spring=item.spring and renewed(item.spring))
 
 
 def _changed(law: L, tree: Tree) -> L:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, cast
 
@@ -446,7 +445,7 @@ class ReferenceSection(Section):
         if name is None:
             raise tree.error("the exact solution needs a `name`.")
         named = EXACT_SOLUTION.read(name, "name", Context())
-        return {item: Key(Number(replace(spec, varies=False))) for item, spec in _parameters(named)}
+        return {item: Key(Number(spec._replace(varies=False))) for item, spec in _parameters(named)}
 
 
 def _parameters(*solutions: str) -> Iterator[tuple[str, Spec]]:

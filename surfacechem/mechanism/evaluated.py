@@ -11,9 +11,8 @@ import copy
 import math
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import symengine
@@ -50,13 +49,12 @@ SUM_TOLERANCE = 1e-6
 """Tolerance of the sum of mole fractions, which has to be one."""
 
 
-@dataclass(frozen=True)
-class Neighbour:
+class Neighbour(NamedTuple):
     """Prescribed state of a phase next to the surface, as histories; constants are histories too."""
 
     pressure: Load | None = None
     """Pressure [Pa]; None if it is not given."""
-    composition: Mapping[str, Load] = field(default_factory=dict)
+    composition: Mapping[str, Load] = {}
     """Mole fractions."""
     rest: str = ""
     """The species whose mole fraction is one minus the sum of the others; empty if the given ones sum to one."""
@@ -321,13 +319,13 @@ class SurfaceEngine:
         refuse_unknown(neighbours, known, f"no reaction of the surface {self.surface.name} has a neighbour '{{}}'")
         electric = "electric_potential", "capacitance", "current"
         kept = {name: {key: getattr(known[name], key) for key in electric} for name in neighbours}
-        return self._holding({name: replace(state, **kept[name]) for name, state in neighbours.items()})
+        return self._holding({name: state._replace(**kept[name]) for name, state in neighbours.items()})
 
     def driven(self, loads: Mapping[str, Load]) -> SurfaceEngine:
         """Return a copy with other external currents into electrodes, by their names."""
         names = {held.phase.name: held.electrode.drive.name for held in self.held if held.electrode}
         given = {held.phase.name: held.given for held in self.held}
-        return self._holding({x: replace(given[x], current=loads[j]) for x, j in names.items() if j in loads})
+        return self._holding({x: given[x]._replace(current=loads[j]) for x, j in names.items() if j in loads})
 
     def _holding(self, states: Mapping[str, Neighbour]) -> SurfaceEngine:
         """Return a copy with other states of some neighbours."""
@@ -400,10 +398,20 @@ class SurfaceEngine:
                 return self._last[1]
             T, amount, end = values[0], values[1], 2 + self._count
             if T > 0 and amount > 0:
-                around = self, T, amount, values[end:]
+                states = values[end:]
+                around = self, T, amount, states
                 if around != self._brought[0]:
                     self._brought[0] = ()  # invalid until all is set, as Cantera may raise
-                    self._bring(T, amount, values[end:])
+                    self.surface.TP = T, None
+                    # A stretched surface has fewer sites per area; Cantera sets their density only for a surface
+                    # with mass.
+                    self.surface.set_unnormalized_coverages(np.ones(self._count))
+                    self.surface.site_density = amount * self._sites / MOLECULAR
+                    for held, read, written in self._parts:
+                        held.put(T, states[read])
+                        held.energies(written)
+                    if self.held:
+                        self._energies = self._both.dot(self._taken).ravel()
                     self._brought[0] = around
                 # Trial coverages of a step need not sum to one; Cantera refuses negative mass.
                 try:
@@ -418,15 +426,3 @@ class SurfaceEngine:
                 found = np.full(len(self.gives), math.nan)
             self._last = values, found
             return found
-
-    def _bring(self, T: float, amount: float, states: Sequence[float]) -> None:
-        """Set temperature [K], amount of sites and states of neighbours."""
-        self.surface.TP = T, None
-        # A stretched surface has fewer sites per area; Cantera sets their density only for a surface with mass.
-        self.surface.set_unnormalized_coverages(np.ones(self._count))
-        self.surface.site_density = amount * self._sites / MOLECULAR
-        for held, read, written in self._parts:
-            held.put(T, states[read])
-            held.energies(written)
-        if self.held:
-            self._energies = self._both.dot(self._taken).ravel()

@@ -8,11 +8,10 @@ import re
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from surfacechem import documents as data
 from surfacechem.contracts.terms import Potential, RateLaw
@@ -47,8 +46,7 @@ REACTIONS_PATH = "interface.mechanism.reactions"
 """Path at which a case changes parameters of reactions."""
 
 
-@dataclass(frozen=True)
-class Mechanism:
+class Mechanism(NamedTuple):
     """A Cantera surface mechanism as potentials, rate laws and coverages of an interface."""
 
     potentials: tuple[Potential, ...]
@@ -248,7 +246,7 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
             raise source.error(f"{title}: thermo: {error.message}", entry, "thermo") from None
         # Cantera's standard state is at that coverage, ours at full coverage: they differ by R T times its logarithm.
         if "reference-state-coverage" in phase:
-            gibbs = replace(gibbs, shift=-math.log(float(phase["reference-state-coverage"])))
+            gibbs = gibbs._replace(shift=-math.log(float(phase["reference-state-coverage"])))
         around = interactions(source, entry, names)
         result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring, around, fixed))
     if (odd := unpaired_dependence(result)) is not None:

@@ -10,9 +10,9 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import MISSING, field, fields
 from functools import cache
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, NamedTuple, Self, cast
 
 from surfacechem.contracts.terms import RateLaw, RateType, Spec, option, parameter, reads
 from surfacechem.errors import InputError
@@ -35,8 +35,7 @@ that this layer has room for 25 steps.
 """
 
 
-@dataclass(frozen=True)
-class CoverageTerm:
+class CoverageTerm(NamedTuple):
     """Factor of a rate by one coverage: 10^(a theta) theta^m exp(-E(theta) / R T), E a polynomial [J/mol]."""
 
     variable: str
@@ -149,7 +148,7 @@ class InterfaceArrhenius(MechanismReaction):
 
     def refine(self, name: str, spec: Spec) -> Spec:
         """Return the specification; the unit of A follows from the order of this reaction."""
-        return replace(spec, unit=unit_of_rate(sum(self.orders.values()))) if name == "A" else spec
+        return spec._replace(unit=unit_of_rate(sum(self.orders.values()))) if name == "A" else spec
 
     def own_reads(self) -> tuple[str, ...]:
         """Return the variables of the coefficient other than temperature."""
@@ -446,7 +445,7 @@ def _made(law: type[RateLaw], rate_type: RateType) -> type[LawReaction]:
         spec = given[source].metadata["spec"]
         if name in rate_type.ratios:
             # The law's constant is one here, so that the other constants are ratios to the Arrhenius coefficient.
-            spec = replace(spec, unit="1", text=f"{spec.text}, over the rate constant")
+            spec = spec._replace(unit="1", text=f"{spec.text}, over the rate constant")
         own[name] = field(default=MISSING if name in renamed else given[source].default, metadata={"spec": spec})
     text = inspect.getdoc(getattr(law, rate_type.method)) or ""
     namespace = {

@@ -26,10 +26,10 @@ import math
 import re
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import chain, count
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, NamedTuple, Self, cast
 
 from surfacechem.contracts.terms import Law, Potential, option, parameter
 from surfacechem.expressions import Expression, by_ranges, log, mixing, polynomial, where
@@ -158,8 +158,7 @@ class Shomate(Series):
     G: float = parameter("J/(mol K)", "constant part of s")
 
 
-@dataclass(frozen=True)
-class ThermoRange:
+class ThermoRange(NamedTuple):
     """A form valid up to the temperature ``top`` [K], which belongs to this range if ``closed``."""
 
     top: float
@@ -167,8 +166,7 @@ class ThermoRange:
     closed: bool = True
 
 
-@dataclass(frozen=True)
-class StandardGibbs:
+class StandardGibbs(NamedTuple):
     """Standard molar Gibbs energy over R [K] as a function of temperature, in one or several ranges.
 
     >>> water = StandardGibbs((ThermoRange(1e9, ConstantCp(h0=-8314.462618, s0=16.628925236)),))
@@ -198,7 +196,7 @@ class StandardGibbs:
     def with_forms(self, forms: Sequence[GibbsForm]) -> StandardGibbs:
         """Return a copy with other forms in its ranges."""
         pairs = zip(self.pieces, forms, strict=True)
-        return replace(self, pieces=tuple(replace(piece, form=form) for piece, form in pairs))
+        return self._replace(pieces=tuple(piece._replace(form=form) for piece, form in pairs))
 
 
 TWO_RANGES: Mapping[str, tuple[type[Series], int, int]] = {"NasaPoly2": (Nasa7, 8, 1), "ShomatePoly2": (Shomate, 1, 8)}
@@ -225,8 +223,7 @@ REFERENCE_T = 298.15
 """Reference temperature [K] of heat capacities."""
 
 
-@dataclass(frozen=True)
-class PiecewisePolynomial:
+class PiecewisePolynomial(NamedTuple):
     """A continuous piecewise polynomial of one coverage, zero at zero coverage.
 
     ``pieces`` holds for each piece the coverage at which it begins and its coefficients of the powers of the coverage.
@@ -283,8 +280,7 @@ class PiecewisePolynomial:
         return PiecewisePolynomial(tuple(pieces))
 
 
-@dataclass(frozen=True)
-class Interaction:
+class Interaction(NamedTuple):
     """Dependence of the enthalpy [J/mol] and entropy [J/(mol K)] of a species on one coverage."""
 
     on: str
@@ -427,8 +423,7 @@ class BondSpring(Law):
         return self.stiffness * (g_n - self.rest_length) ** 2 / 2
 
 
-@dataclass(frozen=True)
-class Species:
+class Species(NamedTuple):
     """A surface species: names in the mechanism and of its coverage, sites, thermo and elasticity.
 
     ``interactions`` are the dependences of its thermo on coverages.
@@ -456,7 +451,7 @@ class Species:
         spring = bind(self.spring, self.path, end) if self.spring else None
         paths = [(form, ".".join(filter(None, (self.path, key))), key) for key, form in self.gibbs.ranges.items()]
         forms = [bind(form, path, f"{end}_{key}" if key else end) for form, path, key in paths]
-        return replace(self, gibbs=self.gibbs.with_forms(forms), spring=spring)
+        return self._replace(gibbs=self.gibbs.with_forms(forms), spring=spring)
 
     @property
     def amount(self) -> str:

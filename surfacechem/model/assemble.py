@@ -200,18 +200,18 @@ def _of_pair(system: System) -> System:
     def renamed(item: Quantity) -> Quantity:
         unit, words = TOTAL_UNITS.get(item.unit, item.unit), item.long_name
         words = words.replace("traction", "force") if unit != item.unit else words
-        return replace(item, unit=unit, long_name=words)
+        return item._replace(unit=unit, long_name=words)
 
     def spec(item: Spec) -> Spec:
-        return replace(item, unit=TOTAL_UNITS.get(item.unit, item.unit))
+        return item._replace(unit=TOTAL_UNITS.get(item.unit, item.unit))
 
     return replace(
         system,
         states=tuple(replace(item, quantity=renamed(item.quantity)) for item in system.states),
-        named=tuple(replace(item, quantity=renamed(item.quantity)) for item in system.named),
-        ledger=tuple(replace(item, quantity=renamed(item.quantity)) for item in system.ledger),
+        named=tuple(item._replace(quantity=renamed(item.quantity)) for item in system.named),
+        ledger=tuple(item._replace(quantity=renamed(item.quantity)) for item in system.ledger),
         parameters=tuple(
-            item if item.path.startswith(AREAL_PATH) else replace(item, spec=spec(item.spec))
+            item if item.path.startswith(AREAL_PATH) else item._replace(spec=spec(item.spec))
             for item in system.parameters
         ),
         in_totals=True,

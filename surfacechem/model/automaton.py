@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import symengine
 
@@ -30,6 +30,9 @@ REST_TIME_PATH = "run.rebounds_rest_at"
 
 When = Mapping[Any, Collection[int]]
 """Values of modes, by their symbols, in which a guard is active; the other modes may have any value."""
+
+ALWAYS: When = {}
+"""Condition on no mode."""
 
 
 def masked(guard: Expression, when: When) -> Expression:
@@ -79,8 +82,7 @@ class Register(Discrete):
     """The value at the start if it follows from the values of a case, by path."""
 
 
-@dataclass(frozen=True)
-class Fold:
+class Fold(NamedTuple):
     """A fold: the loss of the equilibrium of the quasi-static gaps."""
 
     tangent: Expression
@@ -93,8 +95,7 @@ class Fold:
     """Rise of the temperatures that follow each gap, by the heat of its motion [K/m]."""
 
 
-@dataclass(frozen=True)
-class Edge:
+class Edge(NamedTuple):
     """A guard that must stay positive while the modes are those of ``when``; at its zero, modes and state jump.
 
     ``modes`` gives new values of modes and registers, ``reset`` those of states, as expressions of the old ones. If the
@@ -105,8 +106,8 @@ class Edge:
     name: str
     guard: Expression
     reason: str
-    modes: Mapping[Any, Expression] = field(default_factory=dict)
-    reset: Mapping[Any, Expression] = field(default_factory=dict)
+    modes: Mapping[Any, Expression] = {}
+    reset: Mapping[Any, Expression] = {}
     equilibrates: bool = False
     heat: str = "joint"
     """Part that dissipates the energy released before gaps move: 'joint', the support of the bodies along the normal;
@@ -128,7 +129,7 @@ class Edge:
     """Time of flight until it may occur again [s], zero if unknown; its guard restarts from an exact zero."""
     violation: str = "warn"
     """Response to a jump that would destroy entropy: refuse, warn or accept."""
-    when: When = field(default_factory=dict)
+    when: When = ALWAYS
     """Values of the modes in which it is active."""
 
     @property
@@ -160,8 +161,7 @@ class Constraint:
     """New values of its modes and registers along an edge of another constraint."""
 
 
-@dataclass(frozen=True)
-class Equilibrium:
+class Equilibrium(NamedTuple):
     """A gap without inertia or damping: its balance of tractions, which holds at all times."""
 
     state: str
@@ -171,7 +171,7 @@ class Equilibrium:
     # tractions at one time share.
     size: Expression
     """Size of the tractions that balance [Pa]."""
-    coupled: Mapping[str, Expression] = field(default_factory=dict)
+    coupled: Mapping[str, Expression] = {}
     """Gaps that move with it, and by how much: in elastic sticking the elastic gap follows the displacement."""
     active: Expression = 1
     """Zero in modes in which the gap is held."""
@@ -186,8 +186,7 @@ class Equilibrium:
         return self.state.partition("_")[2]
 
 
-@dataclass(frozen=True)
-class Sink:
+class Sink(NamedTuple):
     """A temperature node that takes part of the heat of a jump; a prescribed node passes it to the outside."""
 
     node: str

@@ -16,8 +16,7 @@ Source: Sauer, Duong & Mandadapu (2021), sections 3 and 4.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import symengine
 
@@ -31,8 +30,7 @@ WORK, HEAT, DISSIPATION = "work", "heat", "dissipation"
 """Kinds of powers: work carries no entropy; dissipation arrives as heat, whatever form the energy had before."""
 
 
-@dataclass(frozen=True)
-class PowerFlow:
+class PowerFlow(NamedTuple):
     """Energy that passes from one place to another, per time and reference area [W/m^2].
 
     Each process states its power once: the balances of the nodes, the ledger, the heat fluxes into the bodies and the
@@ -47,7 +45,7 @@ class PowerFlow:
     label: str = ""
     """Name of its account, or of the dissipative process; empty if it only passes between places of the scene."""
     text: str = ""
-    channels: Mapping[str, Expression] = field(default_factory=dict)
+    channels: Mapping[str, Expression] = {}
     """Its parts, by the carrier of the heat."""
     entropy: Expression | None = None
     """Entropy rate [W/(m^2 K)] that it brings from outside, or that is produced on the way. A dissipation without it
@@ -59,14 +57,13 @@ class PowerFlow:
         return symengine.Symbol(f"D_{self.label}") if self.kind == DISSIPATION else self.rate
 
 
-@dataclass(frozen=True)
-class Node:
+class Node(NamedTuple):
     """A temperature node with the free energies of its members."""
 
     name: str
     T: Expression
     T_dot: Expression
-    energies: Mapping[str, Expression] = field(default_factory=dict)
+    energies: Mapping[str, Expression] = {}
     """Free energies of the members, by member name: a body's name or 'interface'."""
     prescribed: bool = False
 

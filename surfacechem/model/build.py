@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from itertools import chain, count
-from typing import Any
+from typing import Any, NamedTuple
 
 import symengine
 
@@ -24,8 +24,7 @@ from surfacechem.scene import Body, Conduction, Interface, Scene, volume_shares
 from surfacechem.tolerances import NO_AMOUNT, RUN_EPS
 
 
-@dataclass(frozen=True)
-class Bond:
+class Bond(NamedTuple):
     """A bonding variable that is a state: its symbol, rate, site density (its amount at one) and initial value."""
 
     symbol: Any
@@ -34,8 +33,7 @@ class Bond:
     initial: Expression
 
 
-@dataclass(frozen=True)
-class Slab:
+class Slab(NamedTuple):
     """A body divided into cells: temperatures from the contact on, with a prescribed far side as the last one."""
 
     number: int
@@ -103,12 +101,11 @@ class Thermal:
     def with_energy(self, member: str, F: Expression) -> Thermal:
         """Return a copy with the free energy of a member [J/m^2]."""
         node = self.node_of[member]
-        changed = replace(node, energies={**node.energies, member: F})
+        changed = node._replace(energies={**node.energies, member: F})
         return replace(self, nodes={**self.nodes, node.name: changed})
 
 
-@dataclass(frozen=True)
-class Energy:
+class Energy(NamedTuple):
     """Free energy of the interface [J/m^2], and the part of the interface on which friction acts."""
 
     psi: Expression
@@ -351,7 +348,7 @@ class Build:
         """The edges of all constraints, each with its resets of the other constraints; those due at once come first."""
         edges = [edge for item in sorted(self.constraints, key=lambda item: not item.at_once) for edge in item.edges]
         for item in self.constraints:
-            edges = [replace(edge, modes={**edge.modes, **item.resets(edge)}) for edge in edges]
+            edges = [edge._replace(modes={**edge.modes, **item.resets(edge)}) for edge in edges]
         return edges
 
     @property
@@ -425,7 +422,7 @@ class Build:
         for name in law.positive:
             sought = name in self.motion.gap_rates and name not in self.scene.initial
             margin = Margin(f"{name} > 0", self._read(law, name, own), f"{name} reached zero, {ends}", path=law.path)
-            self.margins.append(replace(margin, remedy=STARTS.get(name, "") if sought else "", domain=True))
+            self.margins.append(margin._replace(remedy=STARTS.get(name, "") if sought else "", domain=True))
         for name in law.nonnegative:
             if name in met:
                 continue
@@ -486,7 +483,7 @@ class Build:
             if symengine.Symbol(gap) in moving and symengine.sympify(rate).free_symbols & states:
                 found.append(Margin(f"{gap} turns", rate, reason))
         known = {margin.expression for margin in self.margins}
-        self.margins += [replace(item, terminal=False, peak=True) for item in found if item.expression not in known]
+        self.margins += [item._replace(terminal=False, peak=True) for item in found if item.expression not in known]
 
     def varying_margins(self) -> None:
         """Add margins that keep varying parameters in their range, with slack for roundoff at closed bounds."""

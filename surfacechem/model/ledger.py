@@ -6,8 +6,7 @@ Also the totals that the ledger must explain, the sinks of the heat of jumps, an
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import symengine
 
@@ -27,14 +26,13 @@ GEOMETRY = (*GAPS, "J_c")
 """Variables of the free energy that move the surfaces, not their bonds."""
 
 
-@dataclass(frozen=True)
-class Flow:
+class Flow(NamedTuple):
     """Energy flow between two places [W/m^2]; an interface without heat capacity passes it on to the bodies."""
 
     source: str
     target: str
     rate: Expression
-    channels: Mapping[str, Expression] = field(default_factory=dict)
+    channels: Mapping[str, Expression] = {}
 
 
 def energy_flows(build: Build) -> Iterator[Flow]:

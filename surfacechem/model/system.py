@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.contracts.units import TOTAL_UNITS
 from surfacechem.expressions import Expression, depends, without
-from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink, When, masked
+from surfacechem.model.automaton import ALWAYS, Edge, Equilibrium, Mode, Register, Sink, When, masked
 from surfacechem.quantities import GAPS, VELOCITIES, Quantity
 from surfacechem.scene import Engine
 
@@ -39,8 +39,7 @@ END_PATH = "run.t_end"
 """Path of the end of a run [s], the scale for brief times; one second where no run is planned."""
 
 
-@dataclass(frozen=True)
-class Parameter:
+class Parameter(NamedTuple):
     """A run-time number of the compiled scene: a parameter of a law, a mode, a register or a segment's field."""
 
     symbol: Any
@@ -63,8 +62,7 @@ class Parameter:
         return self.load.piece(start)[self.field] if self.load else self.value
 
 
-@dataclass(frozen=True)
-class Given:
+class Given(NamedTuple):
     """Initial value of a quantity, given instead of that of a state, which is usually the quantity's logarithm."""
 
     quantity: Quantity
@@ -126,8 +124,7 @@ class State:
         return self.given.state(values) if self.given.state else math.log(values[self.path])
 
 
-@dataclass(frozen=True)
-class Named:
+class Named(NamedTuple):
     """A named quantity; its expression may use the names of earlier ones."""
 
     quantity: Quantity
@@ -153,8 +150,7 @@ def definitions(named: Sequence[Named]) -> dict[Any, Expression]:
     return result
 
 
-@dataclass(frozen=True)
-class Account:
+class Account(NamedTuple):
     """A line of the ledger: a quantity that is integrated along with the states.
 
     ``kind`` is 'energy supply', 'entropy supply', 'entropy production', 'dissipation', 'heat', 'bonds' or 'statistics';
@@ -167,8 +163,7 @@ class Account:
     law: str = ""
 
 
-@dataclass(frozen=True)
-class Margin:
+class Margin(NamedTuple):
     """An event function that must stay positive. At its zero the run ends; at a mere kink only the step ends."""
 
     name: str
@@ -189,7 +184,7 @@ class Margin:
     """An expression, and the reason to report if it is negative when the margin closes."""
     bound: tuple[str, float] | None = None
     """The state that the margin bounds, and the bound."""
-    when: When = field(default_factory=dict)
+    when: When = ALWAYS
     """Values of the modes in which it is active."""
     at_start: bool = False
     """True if it needs a check at the start only: if it holds there, it holds always."""
@@ -200,8 +195,7 @@ class Margin:
         return masked(self.expression, self.when)
 
 
-@dataclass(frozen=True)
-class Range:
+class Range(NamedTuple):
     """Range of validity of a law in one variable; outside, the law extrapolates."""
 
     variable: str
@@ -210,8 +204,7 @@ class Range:
     law: str
 
 
-@dataclass(frozen=True)
-class RatePair:
+class RatePair(NamedTuple):
     """A forward and a backward rate that are stated separately, compared with the equilibrium constant along a run.
 
     ``departure`` names the quantity ln(k_f/k_r) - ln K(g, T), ``law`` the account of the entropy that both produce.
@@ -222,8 +215,7 @@ class RatePair:
     law: str
 
 
-@dataclass(frozen=True)
-class TimeScale:
+class TimeScale(NamedTuple):
     """Characteristic time of a free motion, with advice if it is too short for a run."""
 
     text: str
@@ -231,16 +223,14 @@ class TimeScale:
     remedy: str
 
 
-@dataclass(frozen=True)
-class ExternalRates:
+class ExternalRates(NamedTuple):
     """An engine that evaluates rates outside the graph, with the expressions of the variables that it reads."""
 
     engine: Engine
     reads: tuple[Expression, ...]
 
 
-@dataclass(frozen=True)
-class Role:
+class Role(NamedTuple):
     """Role of a variable in this scene: evolved, algebraic, prescribed, constant, derived or merged."""
 
     variable: str
@@ -248,24 +238,21 @@ class Role:
     by: str
 
 
-@dataclass(frozen=True)
-class CappedLaw:
+class CappedLaw(NamedTuple):
     """Exponents of a law that are capped: above the cap its exponentials continue along their tangents."""
 
     title: str
     exponents: tuple[Any, ...]
 
 
-@dataclass(frozen=True)
-class Caution:
+class Caution(NamedTuple):
     """Warning to give if an expression becomes negative, at the start or along a run."""
 
     expression: Expression
     text: str
 
 
-@dataclass(frozen=True)
-class Profile:
+class Profile(NamedTuple):
     """Temperature profile across a body, from the contact to the far side."""
 
     number: int
@@ -291,8 +278,7 @@ class Profile:
         return f"profile_{self.number}"
 
 
-@dataclass(frozen=True)
-class Conductor:
+class Conductor(NamedTuple):
     """Data of a body with a conductivity, to judge whether one lumped temperature is enough."""
 
     number: int
@@ -484,7 +470,7 @@ class System:
             for label in self.reactions
         }
         named = tuple(
-            replace(item, expression=factors[item.name].symbol * item.expression) if item.name in factors else item
+            item._replace(expression=factors[item.name].symbol * item.expression) if item.name in factors else item
             for item in self.named
         )
         parameters = (*self.parameters, *factors.values())

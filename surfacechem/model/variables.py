@@ -84,7 +84,7 @@ class Parameters:
         if path in self._paths:
             path = self._numbered(path, "[{}]", self._paths)
         self._paths.add(path)
-        self.items.append(replace(parameter, path=path))
+        self.items.append(parameter._replace(path=path))
         return parameter.symbol
 
     def _numbered(self, name: str, ending: str, taken: Container[str]) -> str:

@@ -9,9 +9,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -107,8 +106,7 @@ MOST_NAMES = 3
 UNITS_AT_STATES, MOST_PANELS_AT_STATES = ("Pa", "W m-2", "N", "W"), 4
 
 
-@dataclass(frozen=True)
-class Panel:
+class Panel(NamedTuple):
     """Curves that share an axis."""
 
     title: str

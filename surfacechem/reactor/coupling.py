@@ -355,7 +355,7 @@ def with_reactors(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
                 f"a reactor takes the place of {name}, so the case must not give it a heat capacity or a temperature "
                 f"that it shares. Write `{name}: {{temperature: 300 K}}`; the value is not used."
             )
-        bodies[name] = replace(body, temperature=Hold(level=float(reactor.T)))
+        bodies[name] = body._replace(temperature=Hold(level=float(reactor.T)))
     first, second = bodies.values()
     return replace(scene, bodies=(first, second))
 

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,8 +52,7 @@ DIFFERENCE_STEPS = 8 * SQRT_EPS
 """A few of the finite-difference steps of Cantera's integrator, which bounds must tolerate."""
 
 
-@dataclass(frozen=True)
-class NeighbourReactor:
+class NeighbourReactor(NamedTuple):
     """A reactor next to the surface, with the indices of its variables in the scene."""
 
     reactor: Any
@@ -137,7 +135,7 @@ class InstantEvents:
             begun = self.instant.apply(index, here)
         elif loads is not None:
             histories = [parameter.load is not None for parameter in self.system.parameters]
-            last = replace(here, parameters=np.where(histories, loads, here.parameters))
+            last = here._replace(parameters=np.where(histories, loads, here.parameters))
             begun, self.loads = self.instant.begin(here, last), None
         point = self.instant.resolve(begun) if begun is not None else None
         if point is None:

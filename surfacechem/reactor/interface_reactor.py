@@ -349,7 +349,14 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
                 f"sensitivities would be wrong. Give {self.name} to the network before the reactors that take from it."
             )
         if not self.passes_breakpoints:
-            self._check_segment(t)
+            # Refuse a time beyond a breakpoint, where the equations are others.
+            breakpoints = self.scene.breakpoints
+            following = bisect_right(breakpoints, self.t)
+            if following < len(breakpoints) and t > breakpoints[following]:
+                raise InputError(
+                    f"the loading has a breakpoint at t = {breakpoints[following]:g} s, which an ordinary ReactorNet "
+                    "steps over. Use surfacechem.reactor.ReactorNet."
+                )
         rates = np.asarray(self._rates(t) / self.unit)
         if not self.passes_breakpoints:
             self._refuse_passed()
@@ -436,16 +443,6 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
         yield from (self.scene.places[path] for path in paths)
         for item in self.scene.neighbours:
             yield from item.places
-
-    def _check_segment(self, t: float) -> None:
-        """Refuse a time beyond a breakpoint, where the equations are others."""
-        breakpoints = self.scene.breakpoints
-        following = bisect_right(breakpoints, self.t)
-        if following < len(breakpoints) and t > breakpoints[following]:
-            raise InputError(
-                f"the loading has a breakpoint at t = {breakpoints[following]:g} s, which an ordinary ReactorNet steps "
-                "over. Use surfacechem.reactor.ReactorNet."
-            )
 
     def _refuse_passed(self) -> None:
         """Refuse a state beyond an edge that no network has carried out."""

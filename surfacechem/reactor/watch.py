@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import cantera
 import numpy as np
@@ -62,8 +62,7 @@ class InterfaceEvent:
     index: int
 
 
-@dataclass(frozen=True)
-class StepPanel:
+class StepPanel(NamedTuple):
     """A part of a step of the integrator, with all that rates at the nodes of its quadrature depend on."""
 
     step: DenseStep

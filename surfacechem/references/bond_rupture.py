@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -196,8 +196,7 @@ class SharedLoadCluster(Cluster):
         return {"phi": phi, "f": self.t_n / (self.n_c * phi)}
 
 
-@dataclass(frozen=True)
-class Expansion:
+class Expansion(NamedTuple):
     r"""The rate r about a bonding state, in units of :math:`e^{1+F_*}`: value, slope and remainder.
 
     .. math:: r(a+\delta)=r(a)+r'(a)\,\delta+e^{x_a}(a+\delta)(e^{-q}-1+q),\quad x_a=\frac Fa,\quad

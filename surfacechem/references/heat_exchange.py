@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -362,8 +361,7 @@ def inverse_laplace(image: Callable[[Complex], Complex], t: Array) -> Array:
     return np.asarray(result)
 
 
-@dataclass(frozen=True)
-class ConductingSlab:
+class ConductingSlab(NamedTuple):
     """A body of capacity C and conductivity k over its thickness, both per area; a lump if it has no conductivity.
 
     Beyond the far side is the temperature ``T_far`` behind a conductance; without capacity the temperature is constant.
@@ -449,8 +447,7 @@ class ConductingSlabs(Reference):
     def bodies(self) -> tuple[ConductingSlab, ConductingSlab]:
         """Both bodies."""
         first, second = (
-            ConductingSlab(**{item.name: getattr(self, f"{item.name}_{k}") for item in fields(ConductingSlab)})
-            for k in (1, 2)
+            ConductingSlab(*[getattr(self, f"{name}_{k}") for name in ConductingSlab._fields]) for k in (1, 2)
         )
         return first, second
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -168,8 +168,7 @@ PANEL_LENGTH = 0.25
 of 16 Gauss points is 25^-32."""
 
 
-@dataclass(frozen=True)
-class SnapPoint:
+class SnapPoint(NamedTuple):
     """A gap at which the equilibrium is lost, with displacement and traction there, the gap after the jump, and the
     energy that the jump turns into heat.
     """

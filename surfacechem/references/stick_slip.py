@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ MOST_CYCLES = 1_000_000
 """Largest number of cycles, so that a time far beyond them is refused at once."""
 
 
-@dataclass(frozen=True)
-class Slip:
+class Slip(NamedTuple):
     """A slip from rest, at which the spring traction exceeds sliding friction by `drop` [Pa]."""
 
     m: float
@@ -136,8 +135,7 @@ class StickSlip(Slider):
         return {"v": np.where(slips, v, 0.0), "u_t": slip, **tractions, "heat": self.t_k * slip}
 
 
-@dataclass(frozen=True)
-class Cycle:
+class Cycle(NamedTuple):
     """A stick and the slip that ends it."""
 
     start: float

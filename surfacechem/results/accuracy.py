@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,13 +116,12 @@ class Accuracy:
         return {**self.named(), **self.variables}
 
 
-@dataclass(frozen=True)
-class CellErrors:
+class CellErrors(NamedTuple):
     """Relative errors that a second run at another tolerance does not see, by variable: of the cells across bodies, or
     of numbers that laws compute themselves; empty if there are none.
     """
 
-    variables: Mapping[str, float] = field(default_factory=dict)
+    variables: Mapping[str, float] = {}
     converged: bool = True
     """True if runs with a half and a quarter of the cells confirm the order, so that the errors are known."""
     in_noise: bool = False
@@ -138,9 +138,9 @@ class CellErrors:
         """Return the sum of both errors, known if both are."""
         names = {**self.variables, **other.variables}
         total = {name: self.variables.get(name, 0.0) + other.variables.get(name, 0.0) for name in names}
-        return replace(other, variables=total, converged=self.converged and other.converged)
+        return other._replace(variables=total, converged=self.converged and other.converged)
 
     def combined(self, other: CellErrors) -> CellErrors:
         """Return the sum of errors of two kinds, with the sources of both."""
         kinds = [found.source for found in (other, self) if found.variables]
-        return replace(self.added_to(other), source=", ".join(kinds), in_noise=self.in_noise or other.in_noise)
+        return self.added_to(other)._replace(source=", ".join(kinds), in_noise=self.in_noise or other.in_noise)

@@ -408,8 +408,7 @@ ROUNDED_DEPARTURE = NEGLIGIBLE
 """Departures below this are rounding of published numbers."""
 
 
-@dataclass(frozen=True)
-class BalanceVerdict:
+class BalanceVerdict(NamedTuple):
     """Range of ln(k_f/k_r) - ln K(g, T) along a run, and whether the pair of rates always produced entropy."""
 
     title: str

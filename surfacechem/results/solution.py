@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,8 +35,7 @@ ASKED_SETTINGS = ("solver", "accuracy", "rtol")
 """Those from which solver and tolerances of a run follow that are chosen for an accuracy."""
 
 
-@dataclass(frozen=True)
-class Judgement:
+class Judgement(NamedTuple):
     """Error of a run, as far as known."""
 
     accuracy: Accuracy | None = None

@@ -80,7 +80,7 @@ def _laws(scene: Scene) -> Iterable[tuple[str, Conduction]]:
 def _changed(scene: Scene, change: Callable[[str, Conduction], Conduction]) -> Scene:
     def changed(body: Body) -> Body:
         law = body.conduction
-        return replace(body, conduction=change(body.name, law)) if law is not None and law.cells else body
+        return body._replace(conduction=change(body.name, law)) if law is not None and law.cells else body
 
     first, second = scene.bodies
     return replace(scene, bodies=(changed(first), changed(second)))

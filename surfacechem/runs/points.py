@@ -93,7 +93,7 @@ def with_histories_held(scene: Scene) -> Scene:
     def body(number: int) -> Any:
         given = scene.bodies[number]
         conduction = given.conduction and replace(given.conduction, far=level(given.conduction.far))
-        return replace(given, temperature=level(given.temperature), conduction=conduction)
+        return given._replace(temperature=level(given.temperature), conduction=conduction)
 
     return replace(
         scene,
@@ -232,7 +232,7 @@ class Evaluator:
         lost = np.zeros(len(table), dtype=bool)
         free = [item for item in self.quasi_static if item.state not in asked]
         moves = [{name: far for name, far in item.coupled.items() if name not in asked} for item in free]
-        items = tuple(replace(item, coupled=along) for item, along in zip(free, moves, strict=True))
+        items = tuple(item._replace(coupled=along) for item, along in zip(free, moves, strict=True))
         equilibria = Equilibria(replace(self.system, equilibria=items))
         gaps = [1 + self.system.state_columns[item.state] for item in items]
         for k, row in enumerate(table if items else ()):

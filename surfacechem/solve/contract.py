@@ -73,8 +73,7 @@ temperature, each step far away halves it, so 60 steps cover 18 decades.
 """
 
 
-@dataclass(frozen=True)
-class Guard:
+class Guard(NamedTuple):
     """Type of an event: the action at a zero crossing of a margin; direction -1 is falling, +1 rising, 0 both.
 
     A margin that has just fired fires again only after it has left zero. A limit (terminal, falling) that starts at

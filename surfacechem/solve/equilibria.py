@@ -5,9 +5,8 @@ for the next one.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -293,8 +292,7 @@ def drift_of(rtol: float) -> float:
     return min(DRIFT * rtol, MOST_DRIFT)
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(NamedTuple):
     """A state with the parameters at that moment."""
 
     t: float
@@ -328,8 +326,7 @@ def rate_of(system: System, expression: Expression) -> Expression:
     return sum((derivative(expanded, s.symbol) * s.dot for s in system.states), derivative(expanded, system.t))
 
 
-@dataclass(frozen=True)
-class GapDirection:
+class GapDirection(NamedTuple):
     """A direction in the space of the gaps, the gap that measures the distance, and the weights of the tractions."""
 
     changes: Array
@@ -340,8 +337,7 @@ class GapDirection:
     """Weights of the driving tractions, shape (equilibria,)."""
 
 
-@dataclass(frozen=True)
-class FoldPoint:
+class FoldPoint(NamedTuple):
     """A fold: its point, the direction in the space of the gaps in which equilibrium is lost, and the sign along it."""
 
     point: Point
@@ -349,8 +345,7 @@ class FoldPoint:
     sign: float
 
 
-@dataclass(frozen=True)
-class FreeGaps:
+class FreeGaps(NamedTuple):
     """The gaps that are not held at a point, as displacements from there."""
 
     which: Indices
@@ -450,7 +445,7 @@ class Equilibria:
     def moved(self, point: Point, rows: Array) -> Point:
         """Return the point with the states and modes of the only row."""
         n = len(point.y)
-        return replace(point, y=rows[0, 1 : 1 + n], parameters=rows[0, 1 + 2 * n :])
+        return point._replace(y=rows[0, 1 : 1 + n], parameters=rows[0, 1 + 2 * n :])
 
     def _curves(self, point: Point, line: GapDirection, heat: Heat | None) -> tuple[Curve, Curve]:
         """Return the driving traction along a direction and its roundoff, as functions of the measuring gap."""
@@ -487,7 +482,7 @@ class Equilibria:
         that is ``lost`` the gaps move on with the parameters of the point.
         """
         if lost is not None:
-            return self._released(replace(lost.point, parameters=point.parameters), heat, lost)
+            return self._released(lost.point._replace(parameters=point.parameters), heat, lost)
         if not self.items or len(self.free(point)) == 0:
             return point
         driving, sizes = self.balance(point)
@@ -507,7 +502,7 @@ class Equilibria:
         line = equilibrium(free.driving, sizes, np.arange(n), np.zeros(n), 1.0)
         if line is None:
             return self.equilibrate(point, heat)
-        there = replace(point, y=point.y + line @ free.changes)
+        there = point._replace(y=point.y + line @ free.changes)
         return self.moved(point, self._arrived(there.inputs()[None], jumps=True))
 
     def _released(self, point: Point, heat: Heat | None, lost: FoldPoint | None) -> Point | None:
@@ -565,7 +560,7 @@ class Equilibria:
             return None
         y, columns = point.y + rest @ free.changes, free.columns
         y[columns] = np.where(np.abs(y[columns]) < GAP_EPS, 0.0, y[columns])  # exact, for laws that end at touch
-        return self.moved(point, self._arrived(replace(point, y=y).inputs()[None], jumps=heat is not None))
+        return self.moved(point, self._arrived(point._replace(y=y).inputs()[None], jumps=heat is not None))
 
     def _unstable(self, point: Point, heat: Heat | None) -> FoldPoint | None:
         """Return the direction in which gaps leave an unstable equilibrium, a fold already passed; None if stable.
@@ -601,7 +596,7 @@ class Equilibria:
                 change = -residual / slope if slope < 0 else 0.0
                 if abs(change) <= NEGLIGIBLE * max(abs(point.y[column]), PICOMETRE):  # larger changes are no drift
                     y += change * with_it
-            point = replace(point, y=y)
+            point = point._replace(y=y)
         return point
 
     # -- sliding --------------------------------------------------------------------------------------------------
@@ -626,7 +621,7 @@ class Equilibria:
         parameters = point.parameters.copy()
         if self.slip is not None:
             parameters[self.slip] = slip
-        return replace(point, parameters=parameters)
+        return point._replace(parameters=parameters)
 
     def would_reverse(self, point: Point, drift: float, noise: float = 0.0, heat: Heat | None = None) -> bool:
         """True if the tractions would pull a sliding gap back, by more than ``drift``, relative to the terms of the
@@ -707,7 +702,7 @@ class Folds:
         if sliding and sign != sliding:
             return None
 
-        there = replace(line, changes=changes)
+        there = line._replace(changes=changes)
 
         def ahead(gaps: Sequence[float] | Array) -> Array:
             return np.asarray(self._tangents[index](self.equilibria.along(point, there, gaps))).reshape(-1)
@@ -748,7 +743,7 @@ class Folds:
         if lost is None:
             return point
         beside = point.ydot - point.ydot[lost.direction.column] * self._shape(index, point)[2]
-        values = self._approach(replace(lost.point, ydot=beside).inputs())
+        values = self._approach(lost.point._replace(ydot=beside).inputs())
         push, change = (lost.sign * float(lost.direction.weights @ part) for part in (values[::2], values[1::2]))
         left = -push / change if push < 0 < change else 0.0
-        return replace(point, t=point.t + left) if left < min(IDLE * point.t, end - point.t) else point
+        return point._replace(t=point.t + left) if left < min(IDLE * point.t, end - point.t) else point

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,8 +102,7 @@ def rounding(result: Result) -> Array:
     return found
 
 
-@dataclass(frozen=True)
-class Arc:
+class Arc(NamedTuple):
     """A solved flow between events, with its time and ledger counted from its start."""
 
     result: Result
@@ -201,7 +200,7 @@ class Hybrid:
         # At zero gap the stiffness may jump and Newton's method stall: go on from the mirrored point.
         closing = self._gaps & (np.abs(point.y) < GAP_EPS) & (point.y * point.ydot < 0)
         if closing.any():
-            return replace(point, y=np.where(closing, -point.y, point.y))
+            return point._replace(y=np.where(closing, -point.y, point.y))
         # After an underflow go on with the time counted from here, which is resolved more finely.
         unresolved = arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._brief_arcs < MOST_BRIEF_ARCS
         return point if unresolved else None

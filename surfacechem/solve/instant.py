@@ -6,7 +6,6 @@ the state after every flow. Edges are carried out one by one, and each adds its 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -165,7 +164,7 @@ class Instant:
         if not steps or before is None:
             return corrected(point)
         before = corrected(before)
-        point, self.step = replace(point, y=before.y), LoadStep(before)
+        point, self.step = point._replace(y=before.y), LoadStep(before)
         return self.apply(steps[0], point, before) if self.jumper.is_loaded(before, point) else point
 
     def resolve(self, point: Point) -> Point | None:
@@ -185,7 +184,7 @@ class Instant:
             if due is None:
                 self.limits = []
                 return point
-            jumped = self.apply(due, replace(point, ydot=seen.ydot))
+            jumped = self.apply(due, point._replace(ydot=seen.ydot))
             if jumped is None:
                 return None
             point = jumped
@@ -260,7 +259,7 @@ class Instant:
             parameters = point.parameters.copy()
             parameters[self.jumper.mode_columns] = self.jumper.modes_after(index, point)
             # The larger magnitude of the margin of sticking on both sides of the edge.
-            both = [self.sizes(at)[self._slip_guards] for at in (replace(point, parameters=parameters), point)]
+            both = [self.sizes(at)[self._slip_guards] for at in (point._replace(parameters=parameters), point)]
             sticking = float(np.max(both))
         slack = EdgeUncertainty(GUARD_EPS * size, drift * size, balanced, GUARD_EPS * sticking, self.rtol)
         step = self.step if self.step is not None and self.step.before.t == point.t else None

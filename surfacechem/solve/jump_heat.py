@@ -12,7 +12,7 @@ of the friction H by the shares :math:`s_k` of the moment.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
@@ -152,7 +152,7 @@ class LoadStep:
 
 def at_part(point: Point, change: Array, part: float) -> Point:
     """Return a point after a load jump with the loads at a part of their path."""
-    return replace(point, parameters=point.parameters - (1 - part) * change)
+    return point._replace(parameters=point.parameters - (1 - part) * change)
 
 
 @cache
@@ -247,7 +247,7 @@ class LoadPath:
         def guard(part: float) -> float:
             loaded = at_part(before, change, part)
             held = self._held(loaded, np.abs(before.y - step.before.y))
-            return float(self._guards(replace(held, parameters=loaded.parameters).inputs())[index])
+            return float(self._guards(held._replace(parameters=loaded.parameters).inputs())[index])
 
         step.reached = _first(guard, step.reached)
 
@@ -268,7 +268,7 @@ class LoadPath:
             """Return the part of the load path at a place, at least that before it, and energy and shares there."""
             y = start.y.copy()
             y[columns] += place * length * line
-            there = replace(start, y=y, parameters=after.parameters)
+            there = start._replace(y=y, parameters=after.parameters)
 
             hot = self.heat.with_heat(start.inputs()[None], taken[None])[0, self.heat.free]
 

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import symengine
@@ -49,8 +50,7 @@ adds a digit or more where they converge at all.
 """
 
 
-@dataclass(frozen=True)
-class EdgeUncertainty:
+class EdgeUncertainty(NamedTuple):
     """Uncertainty of an edge at its moment."""
 
     noise: float = 0.0
@@ -456,7 +456,7 @@ class Jumper:
         if abs(after.y[self.states.index(edge.measure)]) > max(slack.noise, slack.drift):
             return after
         sliding = 0.0 if slip is None else after.parameters[slip]
-        return self.equilibria.with_slip(replace(after, parameters=pending.start.parameters), sliding)
+        return self.equilibria.with_slip(after._replace(parameters=pending.start.parameters), sliding)
 
     def _gaps_at_rest(self, pending: PendingJump, shares: Array | None) -> Point | None:
         """Return the point at which the gaps come to rest, sliding or sticking: friction never pulls sliding back."""
@@ -545,7 +545,7 @@ class Jumper:
             heat, entropy = float(taken[:, out].sum()), float((taken / T)[:, out].sum())
         if not np.all(np.isfinite(rows)):  # nodes cannot take the heat
             raise ImpossibleError(NO_HEAT)
-        return replace(point, y=rows[0, 1 : 1 + len(point.y)]), released, heat, entropy
+        return point._replace(y=rows[0, 1 : 1 + len(point.y)]), released, heat, entropy
 
     def _judged(
         self, edge: Edge, before: Array, after: Array, totals: Array, noise: float, entropy_out: float

@@ -9,9 +9,8 @@ from __future__ import annotations
 import logging
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,8 +132,7 @@ class ListSection(Section):
 # -- drawing ----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """A computed curve in the units of its axes, shape (n,), with the exact one if known, and data."""
 
     label: str
@@ -172,8 +170,7 @@ def _coincide(one: Line, other: Line) -> bool:
     return bool(np.nanmax(np.abs(near)) < HIDDEN_PART * span)
 
 
-@dataclass(frozen=True)
-class ListFigure:
+class ListFigure(NamedTuple):
     """A figure of a list with its curves."""
 
     section: FigureSection

@@ -14,7 +14,6 @@ import itertools
 import math
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from math import lcm
@@ -96,7 +95,7 @@ class Curves:
         psi: Expression = 0
         for potential in self.mechanism.potentials:
             if isinstance(potential, IdealMixture):
-                species = tuple(replace(item, interactions=()) for item in potential.species)
+                species = tuple(item._replace(interactions=()) for item in potential.species)
                 potential = potential.bind({"species": species})
             psi += self._call(potential.statement)
         return psi
@@ -173,8 +172,7 @@ def _symbols(law: InterfaceArrhenius) -> dict[str, Expression]:
     return {name: symengine.Symbol(f"{law.label}.{name}") for name, _ in law.specs()}
 
 
-@dataclass(frozen=True)
-class ReactionCycle:
+class ReactionCycle(NamedTuple):
     """Steps whose changes sum to zero, each with its multiplicity, which is negative if it is taken backwards."""
 
     steps: Sequence[tuple[Step, int]]
@@ -241,8 +239,7 @@ STANDARD_T = 298.15
 TABLE_COLUMNS, CURVE_POINTS = 5, 200
 
 
-@dataclass(frozen=True)
-class Span:
+class Span(NamedTuple):
     """Values from ``low`` to ``high``, in SI."""
 
     low: float

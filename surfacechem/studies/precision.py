@@ -13,11 +13,12 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, count
 from pathlib import Path
 from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 
@@ -93,8 +94,7 @@ def mean_square(times: Array, error: Array) -> float:
     return float(np.sqrt(np.trapezoid(error**2, times) / (times[-1] - times[0])))
 
 
-@dataclass(frozen=True)
-class Subject:
+class Subject(NamedTuple):
     """A case that can be run with any solver at any tolerance."""
 
     case: Case
@@ -144,8 +144,7 @@ class Subject:
         return found
 
 
-@dataclass(frozen=True)
-class Truth:
+class Truth(NamedTuple):
     """True values of the variables at the output times, true event times, and the uncertainty of both."""
 
     source: str
@@ -156,7 +155,7 @@ class Truth:
     events: Values
     end: float
     """Requested end of the run [s]."""
-    uncertainty: Errors = field(default_factory=dict)
+    uncertainty: Mapping[tuple[str, str], float] = {}
 
     @classmethod
     def of(cls, run: Trajectory, source: str, variables: Sequence[str]) -> Truth:
@@ -202,7 +201,7 @@ def with_stored_times(subject: Subject) -> Subject:
     moments = np.concatenate([[0.0], *event_times(found).values()])
     times = times[np.all(np.abs(times[:, None] - moments) > SQRT_EPS * moments, axis=1)]
     times = np.union1d(times, [0.0, run.times[-1]])
-    return replace(subject, case=replace(subject.case, own_run=replace(run, times=tuple(times.tolist()), picture=None)))
+    return subject._replace(case=replace(subject.case, own_run=replace(run, times=tuple(times.tolist()), picture=None)))
 
 
 def establish(subject: Subject, variables: Sequence[str]) -> Truth:
@@ -222,18 +221,18 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
     except InputError as error:
         found = numerical(subject, variables)
         unused = f"the exact solution {reference.name} does not apply to this scene: {error.message}"
-        return replace(found, source=f"{found.source}; {unused}")
+        return found._replace(source=f"{found.source}; {unused}")
     # Variables and event times that the exact solution does not give are those of two methods.
     known = {name: exact[name] for name in variables if name in exact}
     whole, others = Truth.of(trajectory, "", variables), [name for name in variables if name not in known]
     beside = numerical(subject, others) if others or event_times(trajectory) else whole
-    beside = replace(beside, floors=whole.floors)
-    noise = replace(beside, times=result.times, values=known, events={}).errors(moved, {})
+    beside = beside._replace(floors=whole.floors)
+    noise = beside._replace(times=result.times, values=known, events={}).errors(moved, {})
     uncertain = {**beside.uncertainty, **{key: error + EPS for key, error in noise.items()}}
     others += ["events"] if beside.events else []
     source = f"exact solution {reference.name}" + (f"; {', '.join(others)}: {beside.source}" if others else "")
     values = {**beside.values, **known}
-    return replace(beside, source=source, times=result.times, values=values, uncertainty=uncertain)
+    return beside._replace(source=source, times=result.times, values=values, uncertainty=uncertain)
 
 
 def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
@@ -251,7 +250,7 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
     if not found:
         raise InputError("; ".join(failures))
     if len(found) == 1:
-        return replace(found[0], source=f"{found[0].source} alone, which no second method confirms")
+        return found[0]._replace(source=f"{found[0].source} alone, which no second method confirms")
     first, second = min(combinations(found, 2), key=lambda pair: _apart(*pair))
     methods, largest = f"{first.source} and {second.source}", _apart(first, second)
     if math.isinf(largest):
@@ -261,7 +260,7 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
     source = f"{methods}, extrapolated from rtol {MIN_RTOL * TEN:.0e} and {MIN_RTOL:.0e}"
     apart, own = first.errors(second.values, second.events), first.uncertainty
     larger = {key: max(apart.get(key, 0.0), own.get(key, 0.0)) for key in {**apart, **own}}
-    return replace(first, source=source, uncertainty=larger)
+    return first._replace(source=source, uncertainty=larger)
 
 
 def _apart(a: Truth, b: Truth) -> float:
@@ -283,8 +282,8 @@ def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Tr
     values = {name: _limit(before[name], after[name]) for name in variables}
     whole = Truth.of(tight, method, variables)
     limits = {name: _limit(events[name], last[name]) for name in last}
-    truth = replace(whole, times=whole.times[:n], values=values, events=limits)
-    return replace(truth, uncertainty=truth.errors(after, last))
+    truth = whole._replace(times=whole.times[:n], values=values, events=limits)
+    return truth._replace(uncertainty=truth.errors(after, last))
 
 
 def _limit(loose: Array, tight: Array) -> Array:
@@ -340,8 +339,7 @@ class WorkPoint(Cell):
         return errors.get((kind, variable), math.nan) if variable else worst(errors, kind)
 
 
-@dataclass(frozen=True)
-class ComparedCase:
+class ComparedCase(NamedTuple):
     """A case with its reference, or the reason why there is none, and its points by solver and tolerance."""
 
     subject: Subject

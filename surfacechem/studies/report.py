@@ -172,8 +172,7 @@ class PageSection(NamedTuple):
     """Text that is shown verbatim, a case for instance."""
 
 
-@dataclass(frozen=True)
-class Page:
+class Page(NamedTuple):
     """A study as presented to a reader."""
 
     title: str

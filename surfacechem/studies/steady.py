@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,8 +33,7 @@ TRACE_COVERAGE = EPS**2
 """Coverage [1] below which changes are no longer relative to the coverage: the rounding of a rounding."""
 
 
-@dataclass(frozen=True)
-class SteadyState:
+class SteadyState(NamedTuple):
     """Steady state of a mechanism: coverages by species, and requested rates, in SI units.
 
     ``control`` are degrees of rate control, d ln(rate) / d ln(factor on a reaction), by rate and reaction; they sum to

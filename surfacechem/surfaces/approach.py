@@ -10,9 +10,8 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,8 +46,7 @@ Samples = Callable[[float], tuple[float, float, float]]
 """Function from an approach [m] to energy [J], force [N], tension positive, and the relative error of both."""
 
 
-@dataclass(frozen=True)
-class ApproachPiece:
+class ApproachPiece(NamedTuple):
     """Force between two approaches as a polynomial of x, -1 to 1; with ``powers`` the slope of ln E over ln d."""
 
     low: float
@@ -79,8 +77,7 @@ class ApproachPiece:
         return decay(-found) if self.powers else found
 
 
-@dataclass(frozen=True)
-class ApproachEnergy:
+class ApproachEnergy(NamedTuple):
     """Energy over the approach, in pieces, times a factor: the sign of the energy if logarithms are fitted."""
 
     pieces: tuple[ApproachPiece, ...]
@@ -92,11 +89,6 @@ class ApproachEnergy:
     that value if the force changes sign there.
     """
 
-    @property
-    def numbers(self) -> list[Any]:
-        """All numbers that determine it, for storage in a file."""
-        return [[astuple(piece) for piece in self.pieces], self.force, self.factor, self.error]
-
     @classmethod
     def of(cls, numbers: Sequence[Any]) -> ApproachEnergy:
         """Return the energy from stored numbers."""
@@ -106,7 +98,7 @@ class ApproachEnergy:
 
     def perturbed(self, sign: float = 1.0) -> ApproachEnergy:
         """Return the energy increased by its error, or decreased for a negative sign."""
-        return replace(self, factor=self.factor * (1 + sign * self.error))
+        return self._replace(factor=self.factor * (1 + sign * self.error))
 
     def energy(self, d: Expression) -> Expression:
         """Return the energy at an approach [J]; below the least, which only trial states reach, it is linear."""
@@ -171,7 +163,7 @@ def fitted(
         error = float(2 * largest_error(curve, sample.at, least) + max(error for _, _, error in sample.at.values()))
         if error <= rtol:
             break
-    return replace(curve, error=error)
+    return curve._replace(error=error)
 
 
 def largest_error(curve: ApproachEnergy, at: Mapping[float, tuple[float, float, float]], least: float) -> float:

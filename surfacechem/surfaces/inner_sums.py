@@ -18,10 +18,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,8 +47,7 @@ Sums = tuple[Array, Array]
 """For n outer points: energy (n,), and force on them (n, 3)."""
 
 
-@dataclass(frozen=True)
-class Grid:
+class Grid(NamedTuple):
     """Points (k, 3) of the inner surface with areas (k,), each with the index of its outer point (n, 3).
 
     If all outer points have equally many, the shapes are (n, k / n, 3) and (n, k / n), without an index.
@@ -81,8 +79,7 @@ def is_round(shape: Shape) -> bool:
     return type(shape) is Sphere or (type(shape) is Cavity and shape.angle == math.pi)
 
 
-@dataclass(frozen=True)
-class Extent:
+class Extent(NamedTuple):
     """Range of laws of the distance.
 
     Their least power of decay, their cutoff (infinite without one), and distances (increasing) [m] at which they have
@@ -189,8 +186,7 @@ KINK_SAMPLES = 4
 """Parts of a piece between whose ends it is tested if the distance passes that of a kink."""
 
 
-@dataclass(frozen=True)
-class Rays:
+class Rays(NamedTuple):
     """Rays (k,) from the feet of n points (n, 3) to the edges of a surface.
 
     Each has the index of its point, start and end in coordinates (k, 2) without a pole, and twice the area of its
@@ -208,7 +204,7 @@ class Rays:
     def chosen(self, which: Indices) -> Rays:
         """Return some of the rays, with repetitions if an index occurs several times."""
         parts = {name: getattr(self, name)[which] for name in ("owner", "start", "end", "area")}
-        return replace(self, **parts)
+        return self._replace(**parts)
 
     @property
     def scale(self) -> Array:
@@ -431,8 +427,7 @@ def _sums_of(
     return [(energy, push[:, None] * near.normal) for energy, push in np.split(found.T, len(laws))], pairs
 
 
-@dataclass(frozen=True)
-class SumsByGap:
+class SumsByGap(NamedTuple):
     """Sums (n, 2 laws) around the feet of points at gaps (n,), on a shape whose points are all equivalent.
 
     They do not depend on where the foot is: they are over circles up to the laws' cutoff or, without one, up to

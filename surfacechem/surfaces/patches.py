@@ -17,9 +17,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -426,8 +426,7 @@ class Rules:
         return np.concatenate(found)
 
 
-@dataclass(frozen=True)
-class PatchResults:
+class PatchResults(NamedTuple):
     """Results on some patches.
 
     Levels of the rules over and inside each, values (n, ...), their last two changes by the rule over the patch and by
@@ -444,11 +443,8 @@ class PatchResults:
 
     def replaced(self, gone: NDArray[np.bool_], others: PatchResults) -> PatchResults:
         """Return the results without those of some patches, and with others."""
-        kept = {
-            item.name: np.concatenate([getattr(self, item.name)[~gone], getattr(others, item.name)])
-            for item in fields(self)[1:]
-        }
-        return PatchResults(self.patches[~gone].joined(others.patches), **kept)
+        kept = [np.concatenate([own[~gone], other]) for own, other in zip(self[1:], others[1:], strict=True)]
+        return PatchResults(self.patches[~gone].joined(others.patches), *kept)
 
 
 def integral(

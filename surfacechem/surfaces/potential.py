@@ -79,7 +79,7 @@ def curves_of(integrated: Callable[[], Sequence[ApproachEnergy]], *given: Any) -
     mark = fingerprint(*given)
     if mark not in INTEGRATED_CURVES:
         with integrating():
-            found = cached(mark, SOURCES, lambda: [curve.numbers for curve in integrated()])
+            found = cached(mark, SOURCES, integrated)
         log.info("running")
         INTEGRATED_CURVES[mark] = tuple(map(ApproachEnergy.of, found))
     return INTEGRATED_CURVES[mark]

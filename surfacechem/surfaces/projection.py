@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,8 +61,7 @@ def _compiled(shape: Shape, count: int) -> Callable[[Array], Array]:
     return compiled
 
 
-@dataclass(frozen=True)
-class Projection:
+class Projection(NamedTuple):
     """Closest points of a surface; arrays over the projected points.
 
     ``at`` are the parameters (..., 2), ``gap`` is the distance along ``direction``, negative inside the body [m],

@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import cantera as ct
@@ -383,7 +383,7 @@ def test_engines_that_share_a_surface_read_their_own_neighbours(tmp_path):
     engine = surfacechem.load(small(tmp_path, {})).case.scene.interface.engine
     values, swapped = [600.0, 6e18, 0.6, 0.4, 1e5, 0.5, 0.2], {"O2": Hold(level=0.5), "CO": Hold(level=0.2)}
     rate = engine(values)[0]
-    other = engine.with_neighbours({"gas": replace(engine.held[0].given, composition=swapped)})
+    other = engine.with_neighbours({"gas": engine.held[0].given._replace(composition=swapped)})
     assert other(values)[0] != rate == engine(values)[0]
 
 

@@ -148,7 +148,7 @@ def test_every_energy_of_a_body(name):
 
     def make(on):
         plain = scene(on)
-        pair = tuple(dataclasses.replace(body, energy=sample(law, on)) for body in plain.bodies)
+        pair = tuple(body._replace(energy=sample(law, on)) for body in plain.bodies)
         return dataclasses.replace(plain, bodies=pair)
 
     same(make, [])

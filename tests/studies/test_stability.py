@@ -92,7 +92,7 @@ def test_a_search_finds_the_same_corner_again():
 
 
 def expecting(name: str, value: float, expected):
-    return prepared(replace(regimes()[name].problem(value), expected=expected))("radau")
+    return prepared(regimes()[name].problem(value)._replace(expected=expected))("radau")
 
 
 def test_wrong_expectations_are_caught():
@@ -185,7 +185,7 @@ def test_the_report_says_what_every_solver_keeps_and_what_was_left_out(made, mon
     assert "the solvers dop853, lsoda, bdf, scipy-radau, cvode, cantera, which were not asked for" in text
     assert "the search for worst corners, which was not asked for" in text
     assert "steps of a run" not in text
-    monkeypatch.setitem(regimes(), "seconds", replace(regimes()["seconds"], values=(1.0,), space={}))
+    monkeypatch.setitem(regimes(), "seconds", regimes()["seconds"]._replace(values=(1.0,), space={}))
     everything = stability("seconds", solvers=names, rounds=1)
     assert everything.page.omissions == []
     assert "<p>Nothing.</p>" in everything.page.html()

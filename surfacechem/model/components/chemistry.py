@@ -8,7 +8,7 @@ A reaction that takes :math:`-\nu_j` molecules of the species j of an adjacent p
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import symengine
 
@@ -34,8 +34,7 @@ RUPTURE_FACTOR = 4
 """Ratio of the fastest relaxation allowed under load to the loss rate at which bonds count as ruptured."""
 
 
-@dataclass(frozen=True)
-class Reaction:
+class Reaction(NamedTuple):
     """A bound rate law with its affinity and the account of its dissipation."""
 
     label: str
@@ -147,7 +146,7 @@ def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
         quantity = Quantity(f"R_{item.label}", "1/(m^2 s)", f"net rate of {item.law.title}", tag="e:R")
         return build.name(quantity, rates[item.label])
 
-    return [replace(item, rate=named(item)) for item in found]
+    return [item._replace(rate=named(item)) for item in found]
 
 
 def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> Iterator[Caution]:

@@ -67,8 +67,8 @@ def _divided(build: Build, thermal: Thermal, number: int, body: Body, law: Condu
             raise InputError(f"{name} is a temperature inside {body.name}; give the other one another name.", law.place)
         else:
             node = Node(name, symengine.Symbol(name), symengine.Symbol(f"d{name}_dt"))
-        behind.append(replace(node, energies={body.name: share * whole.subs({surface.T: node.T})}))
-    nodes[surface.name] = replace(surface, energies={**surface.energies, body.name: shares[0] * whole})
+        behind.append(node._replace(energies={body.name: share * whole.subs({surface.T: node.T})}))
+    nodes[surface.name] = surface._replace(energies={**surface.energies, body.name: shares[0] * whole})
     slab = Slab(number, body, law, law.points, tuple(behind))
     if law.far is not None:
         far = behind[-1] if law.held else _far_node(build, number, body, law)
@@ -103,7 +103,7 @@ def _fluxes(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Itera
     places = [name, *(b.name for _, b in links)]
     flows = [PowerFlow(HEAT, a, b, flux) for (a, b), flux in zip(pairwise(places), fluxes, strict=True)]
     label, text = f"conduction_{slab.number}", f"heat conduction in {name}"
-    yield replace(flows[0], label=label, text=text, entropy=symengine.Add(*produced))
+    yield flows[0]._replace(label=label, text=text, entropy=symengine.Add(*produced))
     yield from flows[1:]
 
 

@@ -8,7 +8,7 @@ limit of sticking is a half axis for each direction: of an interval, or of an el
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import symengine
 
@@ -43,8 +43,7 @@ UNSTABLE = (
 PLACE = Place(path="mechanics.tangential")
 
 
-@dataclass(frozen=True)
-class Formulation:
+class Formulation(NamedTuple):
     """Formulation of the tangential motion of a scene in one direction."""
 
     d: Direction

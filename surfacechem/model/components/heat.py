@@ -11,7 +11,6 @@ although one of the two fluxes alone may flow uphill: into the hotter body, if t
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import replace
 
 import symengine
 
@@ -130,7 +129,7 @@ def _through_film(build: Build, law: HeatTransfer) -> Iterator[PowerFlow]:
         produced += q * (centre.T - node.T) / (centre.T * node.T)
     # One account for both: a wall that takes heat from a film colder than itself takes it from the other wall, through
     # the film.
-    yield replace(flows[0], label=build.unique("film"), text="heat flow through the film", entropy=produced)
+    yield flows[0]._replace(label=build.unique("film"), text="heat flow through the film", entropy=produced)
     yield from flows[1:]
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -214,7 +213,7 @@ def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
         _net_pressure(build)
     elif build.variables.has("p"):
         build.variables.define("p_contact", lambda: build.variables.get("p", "the contact"), "derived", "p")
-    yield replace(energy, psi=psi)
+    yield energy._replace(psi=psi)
     if build.interface.temperature is not None:
         yield build.thermal.with_energy(INTERFACE, psi)
 

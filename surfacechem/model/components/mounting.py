@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import symengine
 
@@ -32,8 +32,7 @@ GAP_ALONG = {"n": "g_n", "t": "u_t", "t2": "u_t2"}
 SECTIONS = {"n": "normal", "t": "tangential", "t2": "transverse"}
 
 
-@dataclass(frozen=True)
-class Direction:
+class Direction(NamedTuple):
     """A direction along the interface, with the names of its variables."""
 
     axis: str
@@ -53,8 +52,7 @@ SLIDING_TRACTIONS = (ALONG.total, ACROSS.total)
 """Tractions along the interface, which a stage may wait for even if no law reads them."""
 
 
-@dataclass(frozen=True)
-class Support:
+class Support(NamedTuple):
     """The mounting of an axis as the case gives it."""
 
     law: Mounting
@@ -125,8 +123,7 @@ def feels_pressure(law: Law) -> bool:
     return law_reads(law, "p") or law_reads(law, "t_n")
 
 
-@dataclass(frozen=True)
-class FarField:
+class FarField(NamedTuple):
     """A mounting, its parameters as symbols, and the histories that drive it."""
 
     mount: Support
@@ -282,7 +279,7 @@ def _bound(build: Build, mount: Support) -> Mounting:
         items = build.parameters.items
         for i, item in enumerate(items):
             if item.path == path and item.value > 0:
-                items[i] = replace(item, spec=replace(item.spec, above=0.0, at_least=-math.inf))
+                items[i] = item._replace(spec=item.spec._replace(above=0.0, at_least=-math.inf))
         return law
     first = far_field(build, mount.first_axis).law
     if mount.law is mount.first_axis.law:

@@ -24,7 +24,7 @@ Rev. 37, 405, under a load.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +42,7 @@ from surfacechem.tolerances import LARGEST_COVERAGE, LEAST_COVERAGE, RUN_EPS
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Opposed:
+class Opposed(NamedTuple):
     """One-way laws, by label, that change the bonding variables by ``change``, and their reverse laws."""
 
     change: Mapping[str, int | float]

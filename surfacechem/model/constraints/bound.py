@@ -135,6 +135,6 @@ def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression,
     for item in [item for item in build.named if item.name in needed]:
         value = symengine.sympify(item.expression).subs(put)
         if value != item.expression:
-            quantity = replace(item.quantity, name=f"{item.name}_{name}")
+            quantity = item.quantity._replace(name=f"{item.name}_{name}")
             put[symengine.Symbol(item.name)] = build.name(quantity, value, output=False)
     return build.name(Quantity(f"R_{name}", "1/(m^2 s)", "net rate at the bound"), rate.subs(put), output=False)

@@ -22,9 +22,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import symengine
 
@@ -52,8 +51,7 @@ TURN_SCALE = 1e6
 causes as slip begins is no error."""
 
 
-@dataclass(frozen=True)
-class Component:
+class Component(NamedTuple):
     """Tractions in one of the two directions: the pull, the resistance to slip, and the limit of sticking."""
 
     d: Direction

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,7 @@ GUARD_POINTS = 16
 """Points of a step at which guards are evaluated; a pair of zeros between two points shows as a minimum."""
 
 
-@dataclass(frozen=True)
-class DenseStep:
+class DenseStep(NamedTuple):
     """A step from ``start`` to ``end`` [s], with the variables at any time in it.
 
     ``many`` returns the variables at several times, a row each, if a library can do that at once; ``ledger`` is the

@@ -3,7 +3,7 @@
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,8 +174,7 @@ class SteppingSolver(Solver):
         return run.result(status)
 
 
-@dataclass(frozen=True)
-class _Inside:
+class _Inside(NamedTuple):
     """Variables at the quadrature points of consecutive steps, [node, step, ...]."""
 
     times: Array
@@ -308,7 +307,7 @@ class _Run:
 
     def _through(self, step: DenseStep, end: float, inside: _Inside) -> list[int] | None:
         """Accept a step that may have an event; return the fired margins if the library has to restart, else None."""
-        within = replace(step, start=self.t, end=min(step.end, end))
+        within = step._replace(start=self.t, end=min(step.end, end))
         # Simultaneous zeros differ by the error of the library's polynomial.
         resolution = min(self.problem.rtol, SQRT_EPS) * (within.end - self.t) + ULPS * abs(within.end)
         reached, fired = first_crossing(within, self.guards, self.active, resolution)

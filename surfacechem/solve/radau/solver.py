@@ -3,9 +3,9 @@
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, lru_cache, partial
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -312,8 +312,7 @@ def solve_arrays(problem: Problem, *columns: Array, room: Room | None = None) ->
     return batch
 
 
-@dataclass(frozen=True)
-class Consistent:
+class Consistent(NamedTuple):
     """States that satisfy G(t, y, ydot) = 0; ``valid`` is False where none was found."""
 
     y: Array

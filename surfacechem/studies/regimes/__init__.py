@@ -13,10 +13,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -45,8 +44,7 @@ R = TypeVar("R", bound=Reference)
 FOLDER = Path(__file__).parent
 
 
-@dataclass(frozen=True)
-class Exact:
+class Exact(NamedTuple):
     """Expectation that the run finishes with these values at its output times [s], by name, and with so many events.
 
     States are compared, and the named quantities in ``also``; errors are relative to each value.
@@ -55,7 +53,7 @@ class Exact:
     values: Callable[[Array], Values]
     also: Sequence[str] = ()
     events: int | None = None
-    data: Mapping[str, float] = field(default_factory=dict)
+    data: Mapping[str, float] = {}
     again: Callable[[Mapping[str, float], Array], Values] | None = None
     """Function for the values with other data, from which the condition number of the problem follows."""
 
@@ -65,13 +63,12 @@ class Exact:
         return cls(lambda t: read(reference, t), **_varied(reference, read), **more)
 
 
-@dataclass(frozen=True)
-class Stops:
+class Stops(NamedTuple):
     """Expectation that physics ends the run, for a reason that contains these words, at a time [s]."""
 
     reason: str
     t: float
-    data: Mapping[str, float] = field(default_factory=dict)
+    data: Mapping[str, float] = {}
     again: Callable[[Mapping[str, float]], float] | None = None
     """Function for the time with other data, from which the condition number of the problem follows."""
 
@@ -87,8 +84,7 @@ def _varied(reference: R, read: Callable[..., Any]) -> dict[str, Any]:
     return {"data": data, "again": lambda data, *t: read(type(reference)(**data), *t)}
 
 
-@dataclass(frozen=True)
-class Refused:
+class Refused(NamedTuple):
     """Expectation that the input is refused before anything is computed, for a reason that contains these words."""
 
     reason: str
@@ -97,19 +93,17 @@ class Refused:
 Expectation: TypeAlias = Exact | Stops | Refused
 
 
-@dataclass(frozen=True)
-class Trial:
+class Trial(NamedTuple):
     """A case, by its name if shipped or by its file, with changes by path, and the expected result of its run."""
 
     case: str
     times: Sequence[float]
     """Output times [s]; the run begins at 0."""
     expected: Expectation
-    changes: Mapping[str, object] = field(default_factory=dict)
+    changes: Mapping[str, object] = {}
 
 
-@dataclass(frozen=True)
-class Regime:
+class Regime(NamedTuple):
     """A row of the stability matrix: a parameter that varies over decades, and the problem at each value."""
 
     name: str
