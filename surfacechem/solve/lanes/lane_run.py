@@ -13,18 +13,18 @@ from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes.lane_guards import ends_on_guard, find_crossings, may_cross, start_margins
 from surfacechem.solve.lanes.lane_step import (
     END_STAGE,
-    check_outputs,
     find_defects,
+    find_noise,
     find_stiff,
     first_defect,
     interpolate,
-    is_noise,
-    keep_step,
     larger,
     needs_checks,
     norm_of,
+    nothing,
     prepare_checks,
     propose_size,
+    put_moved,
     put_roughly,
     put_start,
     root_of,
@@ -135,15 +135,13 @@ def _first_sizes(w: Any) -> Any:
     """First step sizes: the change of the rate over a small trial step keeps within the tolerance (II.4)."""
     span, speed, size = lanes(w.end) - lanes(w.t), norm_of(w, w.k[0]) / w.loose, norm_of(w, w.y) / w.loose
     trial = smaller(larger(size * NEGLIGIBLE**2, 1e-2) / speed, span * NEGLIGIBLE)
-    put(w.inputs[0], lanes(w.t) + trial)
-    for m in range(w.n):
-        put(w.inputs[1 + m], lanes(w.y[m]) + trial * lanes(w.k[0, m]))
+    put_moved(w, trial, w.k[0], trial)
     evaluate(w, RATES, w.rates)
     for m in range(w.n):
         put(w.rates[m], lanes(w.rates[m]) - lanes(w.k[0, m]))
     change = norm_of(w, w.rates) / w.loose / speed
     scale = trial / change
-    first = smaller(scale * smaller(1.0 / w.root_of(speed * scale), 1.0), 0.05 * span)
+    first = smaller(scale * smaller(1.0 / w.root_of(w, speed * scale), 1.0), 0.05 * span)
     first = where(change * span > SQRT_EPS * trial, first, 0.05 * span)
     return where((speed > 0.0) & (speed < np.inf), first, NEGLIGIBLE * span)
 
@@ -297,8 +295,8 @@ def _go_on(w: Any, lane: int) -> None:
 def _conclude(w: Any, lane: int) -> None:
     """Decide about a trial step that may not be accepted as it is: repeat it, shorter or onto a guard, or accept it."""
     h = w.h[lane]
-    if w.again[lane] > 0.5 and w.is_noise(w, lane):
-        w.stiff_steps[lane] += STIFF_STEPS
+    if w.again[lane] > 0.5:
+        w.find_noise(w, lane)
     if not w.norm[lane] < 1.0:
         w.h_tried[lane], w.norm_tried[lane] = h, min(w.norm[lane], 1e30)
         w.proposed[lane], w.again[lane] = w.following[lane], 1.0
@@ -388,7 +386,8 @@ def _step(w: Any) -> None:
     put(w.t_new, where(lanes(w.last) > 0.5, lanes(w.end), lanes(w.t) + lanes(w.h)))
     set_weights(w)
     w.try_step(w)
-    w.propose_size(w)
+    propose_size(w)
+    w.limit_size(w)
     good = (lanes(w.norm) < 1.0) & (lanes(w.busy) > 0.5)
     put(w.unclear, 0.0)
     if any_lane(good):
@@ -407,7 +406,7 @@ def _step(w: Any) -> None:
                 if w.spacings[lane] >= 0.0:
                     w.defect_at[lane] = first_defect(w, lane)
         if shown:
-            w.check_outputs(w, good)
+            w.check_outputs(w)
         find_crossings(w, good & (lanes(w.defect_at) == 1.0), close)
     _conclude_all(w)
     _move_on(w)
@@ -435,13 +434,14 @@ def run_through(w: Any, count: int) -> None:
             _step(w)
 
 
-def loop_of(name: str, end_stage: int, power: float, memory: Mapping[str, Any], *parts: Any) -> Any:
+def loop_of(name: str, end_stage: int, power: float, memory: Mapping[str, Any], **parts: Any) -> Any:
     """Return the loop with the steps of a method.
 
     ``end_stage`` is the row of its rates at the end of a step, ``power`` that of its error from which the next size
-    follows; the ``parts`` are the compiled functions in which methods differ, which the loop calls by their names.
+    follows; the ``parts`` are the compiled functions in which methods differ, by the names by which the loop calls
+    them.
     """
-    method = {"end_stage": end_stage, "least_root": LEAST_NORM**power, **{part.__name__: part for part in parts}}
+    method = {"end_stage": end_stage, "power": power, "least_root": LEAST_NORM**power, **parts}
     lay_out = laying_out(StepperRecord(name, SIZES, NUMBERS, memory, method))
 
     def run(count: int, table: int) -> None:
@@ -450,7 +450,10 @@ def loop_of(name: str, end_stage: int, power: float, memory: Mapping[str, Any], 
     return run
 
 
-_STEPS = root_of, try_step, propose_size, is_noise, find_stiff, keep_step
-_INSIDE = put_roughly, interpolate, find_defects, check_outputs
-run_explicitly = loop_of("ExplicitLanes", END_STAGE, 0.125, EXPLICIT_MEMORY, *_STEPS, *_INSIDE)
+run_explicitly = loop_of(
+    "ExplicitLanes", END_STAGE, 0.125, EXPLICIT_MEMORY,
+    root_of=root_of, try_step=try_step, limit_size=nothing, find_noise=find_noise, find_stiff=find_stiff,
+    put_roughly=put_roughly, interpolate=interpolate, find_defects=find_defects, check_outputs=nothing,
+    keep_step=nothing,
+)  # fmt: skip
 """Solve the runs of a batch."""

@@ -6,6 +6,7 @@ The rules are those of the stepper for single runs; here the ledger is integrate
 Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, sections II.4, II.5 and II.10 (DOP853).
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -43,23 +44,18 @@ NEAR_END = np.concatenate([np.ones(LANES), 1.0 - _NARROWING, np.ones(LANES)])
 """The same next to its end, with room before the first of them, too."""
 
 
-def _polynomial_table() -> NDArray[np.float64]:
-    """Coefficients of x, x^2, ... of the change over a fraction x of the step, per unit of the step, from all stage
-    rates.
-    """
-    x = Polynomial([0.0, 1.0])
-    table = np.zeros((len(tables.DENSE_FACTORS) + 1, tables.LAST_STAGE + 1))
-    for stage in range(tables.LAST_STAGE + 1):
-        total = Polynomial([0.0])
-        for i, factor in enumerate(tables.DENSE_FACTORS[::-1, stage]):
-            total = (total + factor) * (x if i % 2 == 0 else 1.0 - x)
-        table[: len(total.coef), stage] = total.coef
+def coefficients_of(polynomials: Sequence[Polynomial], count: int) -> NDArray[np.float64]:
+    """Return the coefficients of x, x^2, ..., a row for each power."""
+    table = np.zeros((count + 1, len(polynomials)))
+    for j, each in enumerate(polynomials):
+        table[: len(each.coef), j] = each.coef
     return table[1:]
 
 
 _change = weighted_sums(tables.EXPLICIT, LANES)
 _errors = weighted_sums(tables.EXPLICIT_ERRORS, LANES)
-_coefficients = weighted_sums(_polynomial_table(), LANES)
+# Of the change over a fraction x of the step, per unit of the step, by all rates.
+_coefficients = weighted_sums(coefficients_of(tables.dense_at(Polynomial([0.0, 1.0])), ORDER), LANES)
 
 
 @compiled
@@ -75,7 +71,7 @@ def smaller(a: Any, b: Any) -> Any:
 
 
 @compiled
-def root_of(a: Any) -> Any:
+def root_of(_w: Any, a: Any) -> Any:
     """The eighth root, for step sizes of a method of order 8."""
     return square_root(square_root(square_root(a)))
 
@@ -86,6 +82,14 @@ def put_start(w: Any) -> None:
     put(w.inputs[0], lanes(w.t))
     for m in range(w.n):
         put(w.inputs[1 + m], lanes(w.y[m]))
+
+
+@compiled
+def put_moved(w: Any, passed: Any, changes: Any, factor: Any) -> None:
+    """Set the inputs to the time that has passed since the start of the step, and to the states with these changes."""
+    put(w.inputs[0], lanes(w.t) + passed)
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.y[m]) + factor * lanes(changes[m]))
 
 
 @compiled
@@ -123,9 +127,7 @@ def _evaluate_stage(w: Any, i: int) -> None:
     # What the last two stages of a step have is kept.
     change = w.change_before if i == END_STAGE - 1 else w.change if i <= END_STAGE else w.rates
     _change(i, w.k.ctypes.data, LANES * w.columns, LANES * columns, change.ctypes.data)
-    put(w.inputs[0], lanes(w.t) + tables.EXPLICIT_NODES[i] * h)
-    for m in range(w.n):
-        put(w.inputs[1 + m], lanes(w.y[m]) + h * lanes(change[m]))
+    put_moved(w, tables.EXPLICIT_NODES[i] * h, change, h)
     evaluate(w, RATES, w.k[i])
 
 
@@ -189,7 +191,7 @@ def propose_size(w: Any) -> None:
     """Propose the size of the next step (Gustafsson 1994), or of the repetition of one that fails."""
     h, h_last, given = lanes(w.h), lanes(w.h_last), lanes(w.norm)
     norm = larger(where(given < 1e30, given, 1e30), RUN_EPS)
-    root = w.root_of(norm)
+    root = w.root_of(w, norm)
     put(w.root, root)
     factor, passes = SAFETY / root, norm < 1.0
     predicted = factor * h / h_last * (lanes(w.root_last) / root)
@@ -217,9 +219,10 @@ def find_stiff(w: Any) -> None:
 
 
 @compiled
-def is_noise(w: Any, lane: int) -> bool:
-    """True if the error of a repeated step has not fallen with its size: noise, or stiffness."""
-    return bool(w.norm[lane] > explicit.MAX_ERROR_RATIO * w.norm_tried[lane] * (w.h[lane] / w.h_tried[lane]) ** 8)
+def find_noise(w: Any, lane: int) -> None:
+    """Count a repeated step whose error has not fallen with its size as stiff: the cause is noise, or stiffness."""
+    if w.norm[lane] > explicit.MAX_ERROR_RATIO * w.norm_tried[lane] * (w.h[lane] / w.h_tried[lane]) ** 8:
+        w.stiff_steps[lane] += explicit.STIFF_STEPS
 
 
 @compiled
@@ -376,10 +379,5 @@ def first_defect(w: Any, lane: int) -> float:
 
 
 @compiled
-def check_outputs(w: Any, good: Any) -> None:
-    """Nothing: the dense output of an explicit step is as accurate as its end."""
-
-
-@compiled
-def keep_step(w: Any) -> None:
-    """Nothing: only steps of Radau IIA are predicted from the last one."""
+def nothing(_w: Any, *_given: Any) -> None:
+    """A part of the loop in which nothing is to be done with steps of this method."""

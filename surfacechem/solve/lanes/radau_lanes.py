@@ -15,16 +15,17 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
 from surfacechem.compile.vectors import LANES
-from surfacechem.solve.lanes import lane_step
 from surfacechem.solve.lanes.lane_run import loop_of
 from surfacechem.solve.lanes.lane_step import (
+    coefficients_of,
     differentiate_polynomials,
     error_norm,
     larger,
+    nothing,
     put_inside,
+    put_moved,
     put_points,
     put_start,
     scale_ledger,
@@ -78,19 +79,11 @@ def _polynomials() -> list[Polynomial]:
     return [*every, (Polynomial.fromroots(C) / np.prod(-C)).integ()]
 
 
-def _coefficients_of(polynomials: list[Polynomial], count: int) -> NDArray[np.float64]:
-    """Return the coefficients of x, x^2, ..., a row for each power."""
-    table = np.zeros((count + 1, len(polynomials)))
-    for j, each in enumerate(polynomials):
-        table[: len(each.coef), j] = each.coef
-    return table[1:]
-
-
 _quarters = weighted_sums(np.array([[each(x) for each in _polynomials()] for x in (0.25, 0.5, 0.75)]), LANES)
-_polynomial = weighted_sums(_coefficients_of(_polynomials(), ORDER), LANES)
+_polynomial = weighted_sums(coefficients_of(_polynomials(), ORDER), LANES)
 # The extrapolated change after the end of a step, by its stage rates.
 _after_end = [each(Polynomial([1.0, 1.0])) for each in _polynomials()[1 : 1 + STAGES]]
-_extrapolated = weighted_sums(_coefficients_of(_after_end, STAGES), LANES)
+_extrapolated = weighted_sums(coefficients_of(_after_end, STAGES), LANES)
 _to_slopes = weighted_sums(tables.INVERSE[MEMBER, :STAGES, :STAGES], LANES)
 _to_parts = weighted_sums(tables.TO_PARTS[MEMBER, :STAGES, :STAGES], LANES)
 _from_parts = weighted_sums(tables.FROM_PARTS[MEMBER, :STAGES, :STAGES], LANES)
@@ -213,9 +206,9 @@ def solve_of(w: Any, lane: int, x: Any) -> None:
 
 
 @compiled
-def root_of(a: Any) -> Any:
-    """The sixth root, for step sizes of an estimate of order 5."""
-    return exponential(POWER * logarithm(a))
+def root_of(w: Any, a: Any) -> Any:
+    """The root for step sizes: the power of the method."""
+    return exponential(w.power * logarithm(a))
 
 
 @compiled
@@ -238,9 +231,7 @@ def _predict(w: Any) -> None:
 
 @compiled
 def _put_stage(w: Any, i: int) -> None:
-    put(w.inputs[0], lanes(w.t) + C[i] * lanes(w.h))
-    for m in range(w.n):
-        put(w.inputs[1 + m], lanes(w.y[m]) + lanes(w.z[i, m]))
+    put_moved(w, C[i] * lanes(w.h), w.z[i], 1.0)
 
 
 @compiled
@@ -358,9 +349,7 @@ def _error_norm(w: Any) -> Any:
     norm = error_norm(w, w.error) / w.loose
     again = (norm >= 1.0) & ((lanes(w.again) > 0.5) | ~(lanes(w.h_last) > 0.0)) & (lanes(w.h) > 0.0)
     if any_lane(again):
-        put(w.inputs[0], lanes(w.t))
-        for m in range(w.n):
-            put(w.inputs[1 + m], lanes(w.y[m]) + lanes(w.error[m]))
+        put_moved(w, 0.0, w.error, 1.0)
         evaluate(w, RESIDUAL, w.rates)
         _estimate(w, w.rates)
         for m in range(w.n):
@@ -456,9 +445,8 @@ def try_step(w: Any) -> None:
 
 
 @compiled
-def propose_size(w: Any) -> None:
-    """Propose the size of the next step: also such that Newton's method contracts well."""
-    lane_step.propose_size(w)
+def limit_size(w: Any) -> None:
+    """Limit the size of the next step such that Newton's method contracts well, too."""
     # Shorten the repetition of a step that fails again by the order in its size that its error has shown: it is lower
     # than usual in a transient, and where the rate of an account is singular at the start.
     norm, before = lanes(w.norm), lanes(w.norm_tried)
@@ -487,25 +475,11 @@ def limit_growth(w: Any) -> None:
 
 
 @compiled
-def is_noise(w: Any, lane: int) -> bool:
-    """False: in a transient the estimate need not fall with the size of the step."""
-    return False
-
-
-@compiled
-def find_stiff(w: Any) -> None:
-    """No step is too stiff."""
-    put(w.stiff, 0.0)
-
-
-@compiled
 def put_roughly(w: Any, x: float) -> None:
     """Set the inputs to time and state at a quarter point of each step, by its polynomial."""
-    every, h = LANES * w.columns, lanes(w.h)
-    _quarters(int(4.0 * x) - 1, w.k.ctypes.data, every, LANES * w.n, w.rates.ctypes.data)
-    put(w.inputs[0], lanes(w.t) + x * h)
-    for m in range(w.n):
-        put(w.inputs[1 + m], lanes(w.y[m]) + h * lanes(w.rates[m]))
+    h = lanes(w.h)
+    _quarters(int(4.0 * x) - 1, w.k.ctypes.data, LANES * w.columns, LANES * w.n, w.rates.ctypes.data)
+    put_moved(w, x * h, w.rates, h)
 
 
 @compiled
@@ -537,9 +511,9 @@ def find_defects(w: Any, lane: int, x: Any) -> None:
 
 
 @compiled
-def check_outputs(w: Any, good: Any) -> None:
+def check_outputs(w: Any) -> None:
     """End a step at its next output where the polynomial between the stages is less accurate than the step."""
-    shown = good & (lanes(w.next_output) < lanes(w.t_new)) & (lanes(w.defect_at) == 1.0)
+    shown = (lanes(w.next_output) < lanes(w.t_new)) & (lanes(w.defect_at) == 1.0)
     differentiate_polynomials(w, w.n)
     x = same(tables.PROBE[MEMBER])
     put_inside(w, x)
@@ -563,7 +537,10 @@ def keep_step(w: Any) -> None:
             put_where(taken, w.k_last[i, m], lanes(w.k[1 + i, m]))
 
 
-_STEPS = root_of, try_step, propose_size, is_noise, find_stiff, keep_step
-_INSIDE = put_roughly, interpolate, find_defects, check_outputs
-run_by_radau = loop_of("RadauLanes", STAGES, POWER, RADAU_MEMORY, *_STEPS, *_INSIDE)
+run_by_radau = loop_of(
+    "RadauLanes", STAGES, POWER, RADAU_MEMORY,
+    root_of=root_of, try_step=try_step, limit_size=limit_size, find_noise=nothing, find_stiff=nothing,
+    put_roughly=put_roughly, interpolate=interpolate, find_defects=find_defects, check_outputs=check_outputs,
+    keep_step=keep_step,
+)  # fmt: skip
 """Solve the runs of a batch."""

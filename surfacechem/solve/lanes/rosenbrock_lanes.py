@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from surfacechem.compile.rosenbrock import CHANGES, DENSE, STAGES
 from surfacechem.compile.rosenbrock import GAMMA as GAMMA_OF_STAGES
 from surfacechem.compile.vectors import LANES
-from surfacechem.solve.lanes import lane_step, radau_lanes
+from surfacechem.solve.lanes import radau_lanes
 from surfacechem.solve.lanes.lane_run import CONSTANTS, loop_of
-from surfacechem.solve.lanes.lane_step import error_norm, keep_step, put_start
+from surfacechem.solve.lanes.lane_step import error_norm, nothing, put_moved, put_start
 from surfacechem.solve.lanes.layout import ORDER, ROSENBROCK_MEMORY
-from surfacechem.solve.lanes.vector import exponential, lanes, logarithm, put, same, where
+from surfacechem.solve.lanes.vector import lanes, put, same, where
 from surfacechem.solve.radau.work import compiled, evaluate, weighted_sums
 
 STEP = CONSTANTS + 1
@@ -46,12 +46,6 @@ _quarters = weighted_sums([[x**d for d in range(1, 1 + ORDER)] @ _POLYNOMIALS fo
 
 
 @compiled
-def root_of(a: Any) -> Any:
-    """The fifth root, for step sizes of an estimate of order 4."""
-    return exponential(POWER * logarithm(a))
-
-
-@compiled
 def try_step(w: Any) -> None:
     """Take a step of each lane, and set the norm of its local error."""
     put_start(w)
@@ -64,16 +58,8 @@ def try_step(w: Any) -> None:
 
 
 @compiled
-def propose_size(w: Any) -> None:
-    """Propose the size of the next step."""
-    lane_step.propose_size(w)
-    radau_lanes.limit_growth(w)
-
-
-@compiled
-def find_stiff(w: Any) -> None:
-    """No step is too stiff, but one whose matrix has lost digits is unclear."""
-    put(w.stiff, 0.0)
+def find_doubtful(w: Any) -> None:
+    """Mark as unclear the steps whose matrix has lost digits."""
     put(w.unclear, where(lanes(w.norm) < 1.0, lanes(w.doubtful), 0.0))
 
 
@@ -82,9 +68,7 @@ def put_roughly(w: Any, x: float) -> None:
     """Set the inputs to time and state at a quarter point of each step, by its polynomial."""
     every = LANES * w.n
     _quarters(int(4.0 * x) - 1, w.k.ctypes.data, every, every, w.rates.ctypes.data)
-    put(w.inputs[0], lanes(w.t) + x * lanes(w.h))
-    for m in range(w.n):
-        put(w.inputs[1 + m], lanes(w.y[m]) + lanes(w.rates[m]))
+    put_moved(w, x * lanes(w.h), w.rates, 1.0)
 
 
 @compiled
@@ -110,7 +94,10 @@ def find_defects(w: Any, lane: int, x: Any) -> None:
         put(w.rates[m], lanes(w.rates[m]) * w.loose)
 
 
-_STEPS = root_of, try_step, propose_size, radau_lanes.is_noise, find_stiff, keep_step
-_INSIDE = put_roughly, interpolate, find_defects, radau_lanes.check_outputs
-run_linearly = loop_of("RosenbrockLanes", END_STAGE, POWER, ROSENBROCK_MEMORY, *_STEPS, *_INSIDE)
+run_linearly = loop_of(
+    "RosenbrockLanes", END_STAGE, POWER, ROSENBROCK_MEMORY,
+    root_of=radau_lanes.root_of, try_step=try_step, limit_size=radau_lanes.limit_growth, find_noise=nothing,
+    find_stiff=find_doubtful, put_roughly=put_roughly, interpolate=interpolate, find_defects=find_defects,
+    check_outputs=radau_lanes.check_outputs, keep_step=nothing,
+)  # fmt: skip
 """Solve the runs of a batch."""

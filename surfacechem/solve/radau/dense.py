@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.radau import tables
-from surfacechem.solve.radau.newton import divide, set_stage, stage_count
+from surfacechem.solve.radau.newton import divide, set_stage, stage_count, value_and_slope
 from surfacechem.solve.radau.work import LEDGER, combine, compiled, copy, evaluate, finite, put
 from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS, TINY
 
@@ -45,23 +45,13 @@ def keep_polynomial(w: Any) -> None:
 
 
 @compiled
-def change_and_slope(k: int, x: float, row: Any) -> Any:
-    """Return the change of a polynomial from the start of the step to the fraction x, and its derivative by x."""
-    top = stage_count(k)
-    value, slope = row[top], 0.0
-    for i in range(top - 1, -1, -1):
-        slope = slope * (x - tables.NEWTON_NODES[k, i]) + value
-        value = value * (x - tables.NEWTON_NODES[k, i]) + row[i]
-    return value * x, slope * x + value
-
-
-@compiled
 def put_inside(w: Any, h: float, x: float) -> None:
     """Set trial state and inputs to the dense output at the fraction x of the step, with the derivative of its
     polynomial.
     """
+    top = stage_count(w.member)
     for m in range(w.n):
-        change, slope = change_and_slope(w.member, x, w.polynomial[m])
+        change, slope = value_and_slope(w.member, top, x, w.polynomial[m])
         w.trial[m] = w.y[m] + change
         w.trial_dot[m] = slope / h
     put(w, x * h, w.trial, w.trial_dot)

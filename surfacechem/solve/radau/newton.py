@@ -87,12 +87,13 @@ def divide(k: int, values: Any, m: int, row: Any) -> None:
 
 
 @compiled
-def nested(k: int, top: int, x: float, row: Any) -> float:
-    """Evaluate a polynomial in Newton's form at x; row[top] is its last coefficient."""
-    value = row[top]
+def value_and_slope(k: int, top: int, x: float, row: Any) -> Any:
+    """Evaluate a polynomial in Newton's form, and its derivative, at x; row[top] is its last coefficient."""
+    value, slope = row[top], 0.0
     for i in range(top - 1, -1, -1):
+        slope = slope * (x - tables.NEWTON_NODES[k, i]) + value
         value = value * (x - tables.NEWTON_NODES[k, i]) + row[i]
-    return float(value * x)
+    return value * x, slope * x + value
 
 
 @compiled
@@ -216,7 +217,7 @@ def predict(w: Any, h: float) -> None:
         start = 0.0 if w.offset == 0.0 else w.z_last[top - 1, m]
         for i in range(s):
             x = w.offset + tables.NODES[k, i] * h / w.h_last
-            z[i, m] = nested(last, top - 1, x, row) - start
+            z[i, m] = value_and_slope(last, top - 1, x, row)[0] - start
 
 
 @compiled

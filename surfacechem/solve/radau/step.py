@@ -19,7 +19,6 @@ import numpy as np
 from surfacechem.solve.contract import Status
 from surfacechem.solve.radau.consistency import CONSISTENT, NO_STATE, SINGULAR_STATE, find_consistent
 from surfacechem.solve.radau.dense import (
-    change_and_slope,
     defect_norm,
     explained_norm,
     keep_polynomial,
@@ -47,6 +46,7 @@ from surfacechem.solve.radau.newton import (
     predict,
     solve_stages,
     stage_count,
+    value_and_slope,
 )
 from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
 from surfacechem.solve.radau.stepper import STOP
@@ -531,8 +531,9 @@ def _differs(w: Any, h: float, x: float, remaining: float) -> bool:
     if w.n_ledger == 0:
         return False
     probe_ledger(w, h)
+    top = stage_count(w.member)
     for m in range(w.n_ledger):
-        _, slope = change_and_slope(w.member, x, w.q_polynomial[m])
+        _, slope = value_and_slope(w.member, top, x, w.q_polynomial[m])
         w.q_probe[m] = h * w.q_probe[m] - slope
     return bool(not defect_norm(w, w.q_probe, h, remaining) <= MAX_DEFECT and not explained_norm(w, h) <= MAX_DEFECT)
 

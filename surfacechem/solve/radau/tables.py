@@ -1,8 +1,9 @@
 """Radau IIA coefficients for 3, 5 and 7 stages, and the tables and settings derived from them.
 
 coefficients.json contains those rounded from 60 digits: the nodes c are the zeros of P_{s-1} - P_s shifted to (0, 1]; A
-is the collocation matrix; A^-1 = T diag(lambda) T^-1 is stored as one real eigenvector and (s-1)/2 complex pairs, of
-which only the member with positive imaginary part is stored (PAIR_COLUMNS includes the factor 2 of its conjugate).
+is the collocation matrix; A^-1 = T diag(lambda) T^-1 has one real eigenvalue and (s-1)/2 complex pairs, of which only
+the member with positive imaginary part is stored. -T^-1 and T are real tables: a row, or a column, of the real
+eigenvector, then two of each pair, real and imaginary part (T has the factor 2 of the conjugate, and -Im).
 Tables are padded to seven stages; the first index is the family member k = (s - 3) / 2.
 
 Source: Hairer & Wanner, Solving Ordinary Differential Equations II, sections IV.5 and IV.8.
@@ -29,66 +30,51 @@ COARSE_RTOL = 3e-6
 _GIVEN = json.loads(Path(__file__).with_name("coefficients.json").read_text(encoding="utf-8"))
 
 
-def _padded(name: str) -> NDArray[Any]:
-    """Return the three tables of this name, of shape (s, s), (s, p), ..., in one zero-padded array."""
-    given = _GIVEN[name]
-    if isinstance(given, dict):
-        parts = [[np.array(member) for member in given[part]] for part in ("real", "imag")]
-        members = [real + 1j * imag for real, imag in zip(*parts, strict=True)]
-    else:
-        members = [np.array(member) for member in given]
-    table = np.zeros((3, *members[-1].shape), members[-1].dtype)
-    for k, member in enumerate(members):
-        table[k][tuple(slice(count) for count in member.shape)] = member
+def _padded(name: str, *shape: int) -> NDArray[np.float64]:
+    """Return the tables of this name, each padded with zeros to this shape."""
+    table = np.zeros((len(_GIVEN[name]), *shape))
+    for row, given in zip(table, map(np.array, _GIVEN[name]), strict=True):
+        row[tuple(map(slice, given.shape))] = given
     return table
 
 
 GAMMA = np.array(_GIVEN["GAMMA"])
 """The real eigenvalue of A^-1."""
-NODES = _padded("NODES")
-COLLOCATION = _padded("COLLOCATION")
-INVERSE = _padded("INVERSE")
-REAL_ROW = _padded("REAL_ROW")
-REAL_COLUMN = _padded("REAL_COLUMN")
-PAIR_VALUES = _padded("PAIR_VALUES")
-PAIR_ROWS = _padded("PAIR_ROWS")
-PAIR_COLUMNS = _padded("PAIR_COLUMNS")
-
+NODES = _padded("NODES", 7)
+COLLOCATION, INVERSE = _padded("COLLOCATION", 7, 7), _padded("INVERSE", 7, 7)
+PAIR_VALUES = _padded("PAIR_VALUES_REAL", 3) + 1j * _padded("PAIR_VALUES_IMAG", 3)
+TO_PARTS, FROM_PARTS = _padded("TO_PARTS", 7, 7), _padded("FROM_PARTS", 7, 7)
+"""From residuals to the right-hand sides of the decoupled systems, and from their solutions to the stages."""
 
 LAST_STAGE, STAGES_OF_DENSE = 15, 13
 """Of the explicit method: the last row of its rates, and the number of rows before those that only its dense output
 needs.
 """
-
-
-def _rows(name: str, columns: int) -> NDArray[np.float64]:
-    """Return rows of different lengths as a zero-padded table."""
-    return np.array([np.pad(row, (0, columns - len(row))) for row in _GIVEN[name]])
-
-
 EXPLICIT_NODES = np.array(_GIVEN["EXPLICIT_NODES"])
-EXPLICIT = np.pad(_rows("EXPLICIT", LAST_STAGE + 1), ((1, 0), (0, 0)))
+EXPLICIT = np.pad(_padded("EXPLICIT", LAST_STAGE + 1), ((1, 0), (0, 0)))
 """Coefficients of the stages of the explicit method by the rates of earlier stages; row 12 is the step."""
-EXPLICIT_ERRORS = _rows("EXPLICIT_ERRORS", LAST_STAGE + 1)
+EXPLICIT_ERRORS = _padded("EXPLICIT_ERRORS", LAST_STAGE + 1)
 """Coefficients of the errors of order 5 and 3."""
 _step, _first, _last = EXPLICIT[12], np.eye(LAST_STAGE + 1)[0], np.eye(LAST_STAGE + 1)[12]
-DENSE_FACTORS = np.array(
-    [_step, _first - _step, 2.0 * _step - _last - _first, *_rows("EXPLICIT_DENSE", LAST_STAGE + 1)]
-)
+_dense = _step, _first - _step, 2.0 * _step - _last - _first, *_padded("EXPLICIT_DENSE", LAST_STAGE + 1)
+DENSE_FACTORS = np.array(_dense).T
 """Coefficients of F_0, F_1, ... in the dense output x (F_0 + (1 - x) (F_1 + x (F_2 + (1 - x) (F_3 + ...)))) of an
-explicit step, by all its rates; F_0 to F_2 interpolate both ends.
+explicit step, a row for each of its rates; F_0 to F_2 interpolate both ends.
 """
 
 
-def _dense(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the coefficients of an explicit step's dense output at these nodes, by all its rates."""
-    table = np.zeros((len(nodes), LAST_STAGE + 1))
-    for i, factor in enumerate(reversed(DENSE_FACTORS)):
-        table = (table + factor) * (nodes if i % 2 == 0 else 1.0 - nodes)[:, None]
-    return table
+def dense_at(x: Any) -> list[Any]:
+    """Return the coefficients of an explicit step's dense output by its rates, at numbers or as polynomials of x."""
+    found = []
+    for factors in DENSE_FACTORS:
+        total = 0.0
+        for i, factor in enumerate(factors[::-1]):
+            total = (total + factor) * (x if i % 2 == 0 else 1.0 - x)
+        found.append(total)
+    return found
 
 
-DENSE = _dense(np.array(_GIVEN["NODES"][2]))
+DENSE = np.array(dense_at(NODES[2])).T
 
 
 def _lagrange(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -171,16 +157,6 @@ def _inverse_gaps(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
     return table
 
 
-def _real_rows() -> NDArray[np.float64]:
-    """Return T^-1 and T as real tables: a row, or a column, of the real eigenvector, then two of each pair."""
-    rows, columns = np.zeros((3, 7, 7)), np.zeros((3, 7, 7))
-    rows[:, 0], rows[:, 1::2], rows[:, 2::2] = REAL_ROW, PAIR_ROWS.real, PAIR_ROWS.imag
-    columns[:, :, 0], columns[:, :, 1::2], columns[:, :, 2::2] = REAL_COLUMN, PAIR_COLUMNS.real, -PAIR_COLUMNS.imag
-    return np.stack([-rows, columns])
-
-
-TO_PARTS, FROM_PARTS = _real_rows()
-"""From residuals to the right-hand sides of the decoupled systems, and from their solutions to the stages."""
 _members = [NODES[k, :s] for k, s in enumerate(STAGES)]
 START_RATE = np.array([np.pad(-_lagrange(c) * np.prod(-c), (0, 7 - len(c))) for c in _members])
 """Values at 0 of the Lagrange polynomials on c_1, ..., c_s: they extrapolate stage rates to the start of the step."""
