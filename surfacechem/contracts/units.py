@@ -324,8 +324,7 @@ def _unit(text: str) -> Any:
     """Return Pint's unit of a text; InputError if there is none."""
     import pint
 
-    bare = _EXPONENT.sub("", text)
-    numbers = re.findall(r"(?<!\w)[\d.]+", bare)
+    numbers = re.findall(r"(?<!\w)[\d.]+", _EXPONENT.sub("", text))
     if POWER_TOWER.search(text) or any(number != "1" for number in numbers):
         raise InputError(f"{_short(text)} is not a unit.{_HINT}")
     try:

@@ -395,8 +395,7 @@ def overridden(tree: Tree, overrides: str | Sequence[str] | Mapping[str, object]
     {'run': {'until': '7 s'}}
     """
     for path, value in _pairs(overrides):
-        place = Place(OVERRIDE, 0, path)
-        tree = _set(tree, path.split("."), value, place)
+        tree = _set(tree, path.split("."), value, Place(OVERRIDE, 0, path))
     return with_paths(tree)
 
 

@@ -564,8 +564,7 @@ def _distribution(path: str, tree: Tree, unit: str) -> Distribution:
         return Distribution(name.capitalize(), kind.values)
     if not kind.first < kind.last:
         raise kind.error(f"the values from {kind.first:g} to {kind.last:g} do not increase.")
-    numbers = {"low": kind.first, "high": kind.last, "logarithmic": _logarithmic(kind)}
-    return Distribution("Uniform", numbers)
+    return Distribution("Uniform", {"low": kind.first, "high": kind.last, "logarithmic": _logarithmic(kind)})
 
 
 def _column(table: TableSection, path: str, unit: str) -> Distribution:

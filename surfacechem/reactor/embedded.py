@@ -244,11 +244,6 @@ class EmbeddedScene:
         return any(depends(expression, system.t) for expression in (*named, *system.rows.values()))
 
     @property
-    def output_names(self) -> list[str]:
-        """Names of the named quantities of the dataset."""
-        return list(self.model.system.output_columns)
-
-    @property
     def accounts(self) -> tuple[str, ...]:
         """Names of the ledger's lines."""
         return tuple(account.quantity.name for account in self.model.system.ledger)
@@ -302,8 +297,7 @@ class EmbeddedScene:
         left = np.abs(evaluation.margins()[terminal]) / np.maximum(np.abs(before), TINY)
         if not len(left) or left.min() > STALLED:
             return "the step size fell to rounding level; the scene may end"
-        reasons = [margin.reason for margin in self.model.margins if margin.terminal]
-        return reasons[int(left.argmin())]
+        return self.model.margins[int(terminal[left.argmin()])].reason
 
     def quantity(self, name: str, t: float, x: Array) -> float:
         """Return a state or a named quantity in SI units."""
@@ -314,9 +308,8 @@ class EmbeddedScene:
         found = dict(zip((state.name for state in system.states), evaluation.y, strict=True))
         if name in found:
             return float(found[name])
-        names = self.output_names
-        refuse_unknown([name], [*names, *found], "the scene has no quantity '{}'")
-        return float(self.model.output_function(evaluation.inputs)[names.index(name)])
+        refuse_unknown([name], [*system.output_columns, *found], "the scene has no quantity '{}'")
+        return float(self.model.output_function(evaluation.inputs)[system.output_columns[name]])
 
     @cached_property
     def breakpoints(self) -> tuple[float, ...]:

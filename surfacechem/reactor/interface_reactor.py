@@ -218,7 +218,7 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
     def T(self) -> float:
         """Present temperature of the interface [K]; InputError if neither it nor the whole scene has one."""
         node = self.scene.case.scene.interface.temperature
-        known = (*self.scene.states, *self.scene.output_names)
+        known = {*self.scene.states, *self.scene.model.system.output_columns}
         own = [name for name in (node if isinstance(node, str) else "T_c", "T") if name in known]
         if not own:
             raise InputError(f"the interface of {self.name} has no temperature of its own. Ask for {self.name}['T_1'].")

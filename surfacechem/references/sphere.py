@@ -42,8 +42,7 @@ class SphereOnSpring(AttractionOnSpring):
         if len(times) != 3 or values[0] != values[2] or times[2] != 2 * times[1]:
             raise InputError("it needs a table of `w_n` that goes to one displacement and back at one speed.")
         speed = (values[0] - values[1]) / times[1]
-        drive = {"w_i": values[0], "w_turn": values[1], "speed": speed}
-        return {**super().from_scene(scene), **drive}
+        return {**super().from_scene(scene), "w_i": values[0], "w_turn": values[1], "speed": speed}
 
     @property
     def end_time(self) -> float:

@@ -220,8 +220,7 @@ def _events(dataset: Data) -> list[PageSection]:
 def _balances(attributes: Any) -> PageSection:
     """Return the section on the residuals of the balances."""
     rows = [(name, f"{attributes[f'{name}_error']:.2g}") for name in ("energy", "entropy", "site")]
-    destroyed = attributes.get("entropy_violations", "none")
-    rows.append(("laws that destroy entropy", destroyed))
+    rows.append(("laws that destroy entropy", attributes.get("entropy_violations", "none")))
     return PageSection("Balances", tables=[PageTable(("balance", "largest residual, relative"), rows)])
 
 

@@ -6,7 +6,7 @@ Source of the degree of rate control: Campbell (2017), ACS Catal. 7, 2770, doi 1
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ import numpy as np
 from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.format import Overrides, Source
 from surfacechem.model.system import System
-from surfacechem.quantities import GAS_CONSTANT, Quantity
+from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.runs.at_rest import refuse_histories
 from surfacechem.runs.listing import Rows, Sheet
 from surfacechem.runs.simulation import load
@@ -107,6 +107,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     if not of:
         rest.drop_small()
     rates, held = rest.outputs(rest.x), _held(system, rest.values)
+    found = [*zip(rest.quantities, rest.x.tolist(), strict=True)]
     for (name, j), rate in zip(rest.wanted.items(), rates, strict=True):
         if abs(rate) <= LOOSE_RTOL * rest.largest[j]:
             raise InputError(f"{name} is zero at rest, so nothing controls it. Ask for what goes on there.")
@@ -115,8 +116,8 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
     return SteadyState(
         simulation.case.title,
         rest.time,
-        {q.species: x if x > TRACE_COVERAGE else 0.0 for q, x in rest.found if q.species},
-        {q.name: x for q, x in rest.found if not q.species},
+        {q.species: x if x > TRACE_COVERAGE else 0.0 for q, x in found if q.species},
+        {q.name: x for q, x in found if not q.species},
         dict(zip(rest.wanted, rates.tolist(), strict=True)),
         {
             name: dict(zip(labels, column, strict=True))
@@ -185,11 +186,6 @@ class _Rest:
                 return
             self.time *= LONGER_BY
         raise InputError(f"the case did not reach a steady state within {self.time / LONGER_BY:.3g} s.")
-
-    @property
-    def found(self) -> Iterator[tuple[Quantity, float]]:
-        """The states with their values."""
-        return zip(self.quantities, self.x.tolist(), strict=True)
 
     @property
     def units(self) -> dict[str, str]:
