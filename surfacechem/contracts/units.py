@@ -291,18 +291,15 @@ def _by_pint(number: str, given: str, unit: str, name: str, difference: bool) ->
             raise InputError(f"{shown} is a temperature, {name} a difference of temperatures; give it in K.")
         if not source.is_compatible_with(target):
             raise InputError(f"{shown} is {_described(source)}; {name} needs {dimension(unit)}.")
-        if _has_angle(source) and not _has_angle(target):
+        # Pint treats radians as one, so that 1 rpm would not be 1/60 Hz.
+        angles = ["radian" in str(registry.Quantity(1, each).to_root_units().units) for each in (source, target)]
+        if angles == [True, False]:
             raise InputError(f"{shown} counts an angle; {name} needs {dimension(unit)}: cycles per second in Hz, say.")
         return _as_float(registry.Quantity(Decimal(number), source).m_as(target))
     except TypeError:  # Pint takes no logarithms of decimals
         raise InputError(f"{shown} is in a logarithmic unit; {name} needs {dimension(unit)}.") from None
     except ArithmeticError:
         raise InputError(f"{shown} is too large or too small to convert to {unit}.") from None
-
-
-def _has_angle(unit: Any) -> bool:
-    """True if a unit contains radians. Pint treats them as one, so that 1 rpm would not be 1/60 Hz."""
-    return "radian" in str(_registry().Quantity(1, unit).to_root_units().units)
 
 
 def _per_particle(source: Any, target: Any) -> Any:

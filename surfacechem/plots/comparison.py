@@ -187,4 +187,4 @@ def _label_axis(axes: Sequence[Axes], datasets: Sequence[Data], over: str, begin
     elif "sweep" in datasets[0].attrs:
         style.draw_parameter(axes[-1].xaxis, first)
     else:
-        style.label(axes[-1].xaxis, style.variable_words(first), unit(first), values)
+        style.label(axes[-1].xaxis, f"{style.meaning(first)} {symbol(first.name)}", unit(first), values)

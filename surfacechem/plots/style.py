@@ -333,11 +333,6 @@ def meaning(values: DataVariable) -> str:
     return text[:1].upper() + text[1:]
 
 
-def variable_words(values: DataVariable) -> str:
-    """Return the meaning of a variable and its symbol."""
-    return f"{meaning(values)} {symbol(values.name)}"
-
-
 def quantity_words(values: DataVariable) -> str:
     """Return the symbol of a variable, or words for a time to a value or an event."""
     name = values.name
@@ -590,7 +585,7 @@ def label(
 
 def label_variable(axis: XAxis | YAxis, values: DataVariable) -> None:
     """Label a linear axis with meaning, symbol and unit of a variable."""
-    label(axis, variable_words(values), unit(values), values.values)
+    label(axis, f"{meaning(values)} {symbol(values.name)}", unit(values), values.values)
 
 
 def varies(values: Array, size: float = 0.0) -> bool:
