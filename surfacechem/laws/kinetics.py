@@ -248,6 +248,12 @@ class BondRates(RateLaw):
         on = scaled_exp(numbers["k_on"], self.log_on(f, T_c))
         return n_c * (on * (1 - phi) - scaled_exp(numbers[self.off], self.log_off(f, T_c)) * phi)
 
+    def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
+        """Logarithms of the coefficients of formation and rupture."""
+        numbers = vars(self)
+        on, off = log_fraction(numbers["k_on"]), log_fraction(numbers[self.off])
+        return on + self.log_on(f, T_c), off + self.log_off(f, T_c)
+
     @property
     def log_ratio(self) -> Callable[..., Expression] | None:
         """Logarithm of the rate of formation over that of rupture; None if no bonds form."""
@@ -256,8 +262,7 @@ class BondRates(RateLaw):
         return self._log_ratio if is_symbolic(k_on) or k_on else None
 
     def _log_ratio(self, phi: Expression, f: Expression, T_c: Expression) -> Expression:
-        on, off = (log_fraction(vars(self)[name]) for name in ("k_on", self.off))
-        on, off = on + self.log_on(f, T_c), off + self.log_off(f, T_c)
+        on, off = self.log_coefficients(f, T_c)
         return on - off + log_fraction(1 - phi) - log_fraction(phi)
 
 
