@@ -92,7 +92,7 @@ def slider() -> tuple[Program, EdgeTables]:
     edges = EdgeTables(
         sizes=np.array([4, 0, 4]),
         code=np.array([(f.address, f.user) if f else (0, 0) for f in asked]),
-        edges=np.array([(-1, 0, 0, -1)] * 2),
+        edges=np.array([(-1, 0, 0, -1, 0)] * 2),
         when=np.array([(0, 0, 0), (1, 0, 1)]),
         held=np.array([0]),
         clocks=np.array([1]),

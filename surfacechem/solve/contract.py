@@ -133,25 +133,6 @@ class EdgeTables:
         return np.array([word for table in tables for word in (table.ctypes.data, *table.shape)], np.int64)
 
 
-def integers(rows: Sequence[Any], *shape: int) -> Index:
-    """Return an array of integers of this shape."""
-    return np.array(rows, np.int64).reshape(shape)
-
-
-NO_EDGES = EdgeTables(
-    sizes=np.zeros(3, np.int64),
-    code=integers([], 0, 2),
-    edges=integers([], 0, 4),
-    when=integers([], 0, 3),
-    held=integers([], 0),
-    clocks=integers([], 0),
-    nodes=integers([], 0),
-    accounts=integers([], 0, 2),
-    least_peaks=np.zeros(0),
-)
-"""Empty tables: runs end at guards of edges."""
-
-
 @dataclass(frozen=True)
 class Problem:
     """An initial value problem; algebraic entries of y0 are first guesses."""
@@ -192,8 +173,8 @@ class Problem:
     """True if steps may be explicit where the equations give their rates and are not stiff."""
     implicit_lanes: bool = False
     """True if a batch may take implicit steps of several runs at once."""
-    edges: EdgeTables = NO_EDGES
-    """Edges that the method itself may carry out."""
+    edges: EdgeTables | None = None
+    """Edges that the method itself may carry out; None if runs end at their guards."""
 
     def __post_init__(self) -> None:
         """Check the sizes of the arrays, which compiled code does not."""
@@ -242,6 +223,14 @@ class States(NamedTuple):
         """Some of the rows."""
         assert self.segment is not None
         return States(self.t[rows], self.y[rows], self.ledger[rows], self.segment[rows])
+
+    def in_order(self) -> "States":
+        """Return them by segment and by time within it, each time once."""
+        assert self.segment is not None
+        order = np.lexsort((self.t, self.segment)) if self.segment.any() else self.t.argsort(kind="stable")
+        t, segment, new = self.t[order], self.segment[order], np.ones(len(order), dtype=bool)
+        new[1:] = (t[1:] != t[:-1]) | (segment[1:] != segment[:-1])
+        return self.picked(order[new])
 
 
 @dataclass(frozen=True)
@@ -310,32 +299,16 @@ class Result(NamedTuple):
 
     def states(self) -> States:
         """Return all stored states in order of time, each once on each side of a breakpoint."""
-        t, y, ledger, segment = self.scattered()
-        kept = in_order(t, segment)
-        return States(t[kept], y[kept], ledger[kept], segment[kept])
-
-    def scattered(self) -> tuple[Array, Array, Array, Index]:
-        """Return times, states, ledgers and segments of all stored states, unsorted."""
         parts = [States(self.times, self.outputs, self.ledger_outputs)]
         if self.steps is not None:
             parts.append(States(self.steps.t, self.steps.y, self.steps.ledger))
         if self.inside is not None:
             parts.append(self.inside)
         t, y, ledger = (np.concatenate(columns) for columns in zip(*(part[:3] for part in parts), strict=True))
-        if len(self.problem.segments) == 2:
-            return t, y, ledger, np.zeros(len(t), np.int64)
         segment = self.segments_at(t)
         if self.inside is not None:  # a state stored at a breakpoint belongs to its other side
             segment[len(t) - len(self.inside.t) :] += among(self.inside.t, self.problem.segments[1:-1])
-        return t, y, ledger, segment
-
-
-def in_order(t: Array, segment: Index) -> Index:
-    """Return indices that sort points by segment and by time within it, each time once."""
-    order = np.lexsort((t, segment)) if segment.any() else t.argsort(kind="stable")
-    t, segment, new = t[order], segment[order], np.ones(len(order), dtype=bool)
-    new[1:] = (t[1:] != t[:-1]) | (segment[1:] != segment[:-1])
-    return order[new]
+        return States(t, y, ledger, segment).in_order()
 
 
 class Solver(ABC):

@@ -113,7 +113,7 @@ def resolve(w: Any, i: int, end: float) -> bool:
             set_inputs(w, w.trial, w.trial_dot)
             evaluate(w, MARGINS, w.margin_probe)
         for m in range(first if w.jump_times[-1] >= 0.0 else 0):  # limits beyond which a jump has carried the state
-            slack = 0.0 if w.kinds[m, 5] == 1 else GUARD_EPS * w.magnitude[m]
+            slack = 0.0 if w.kinds[m, 4] == 1 else GUARD_EPS * w.magnitude[m]
             if w.kinds[m, 0] == 1 and w.active[m] == 1 and w.margin_probe[m] < -slack:
                 return False
         due = _due(w, first)

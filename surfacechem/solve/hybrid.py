@@ -30,7 +30,6 @@ from surfacechem.solve.contract import (
     Solver,
     States,
     Status,
-    in_order,
 )
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY_REBOUNDS, MISSED_CLOSING, SAME_MOMENT, Instant
@@ -333,9 +332,7 @@ def known_states(parts: Sequence[States], ends: Array) -> States:
     """
     outputs, *others = parts
     within = [rows._replace(t=np.minimum(rows.t, ends[rows.segment])) for rows in others]
-    t, y, ledger, segment = map(np.concatenate, zip(outputs, *within, strict=True))
-    kept = in_order(t, segment)
-    return States(t[kept], y[kept], ledger[kept], segment[kept])
+    return States(*map(np.concatenate, zip(outputs, *within, strict=True))).in_order()
 
 
 def carried(problem: Problem, jumper: Jumper) -> Flow[tuple[Result, list[Jump], str] | None]:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import symengine
@@ -22,7 +22,7 @@ from surfacechem.model.automaton import INTERFACE, REST_TIME_PATH, Edge
 from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import START, System
 from surfacechem.quantities import VELOCITIES
-from surfacechem.solve.contract import Array, EdgeTables, integers
+from surfacechem.solve.contract import Array, EdgeTables, Index
 from surfacechem.solve.equilibria import BALANCED, Equilibria, FoldPoint, Folds, Point, compiled, formulas, rate_of
 from surfacechem.solve.jump_heat import JumpHeat, LoadPath, LoadStep
 from surfacechem.solve.radau.stepper import (
@@ -97,6 +97,10 @@ class Jump:
 def velocity_scales(system: System) -> Array:
     """Return the scales of the velocities among the states, zero for the other states."""
     return np.array([state.size * (state.name in VELOCITIES) for state in system.states])
+
+
+def _integers(rows: Sequence[Any], *shape: int) -> Index:
+    return np.array(rows, np.int64).reshape(shape)
 
 
 _ONE_THREAD = threading.RLock()
@@ -251,14 +255,14 @@ class Jumper:
         starts = [j for j, p in enumerate(system.parameters) if p.path == START]
         sizes = 4 + len(given), len(nodes) * (3 + len(system.sinks)), len(self.states) + len(self.mode_columns)
         return EdgeTables(
-            sizes=integers(sizes, 3),
-            code=integers([(f.address, f.user) if f else (0, 0) for f in functions], -1, 2),
-            edges=integers([self._row(edge) for edge in system.edges], -1, 5),
-            when=integers(system.guard_conditions, -1, 3),
-            held=integers(self.mode_columns, -1),
-            clocks=integers([*starts, *system.origins], -1),
-            nodes=integers([-1 if node.prescribed else self.states.index(node.node) for node in nodes], -1),
-            accounts=integers(self._accounts, -1, 2),
+            sizes=_integers(sizes, 3),
+            code=_integers([(f.address, f.user) if f else (0, 0) for f in functions], -1, 2),
+            edges=_integers([self._row(edge) for edge in system.edges], -1, 5),
+            when=_integers(system.guard_conditions, -1, 3),
+            held=_integers(self.mode_columns, -1),
+            clocks=_integers([*starts, *system.origins], -1),
+            nodes=_integers([-1 if node.prescribed else self.states.index(node.node) for node in nodes], -1),
+            accounts=_integers(self._accounts, -1, 2),
             least_peaks=velocity_scales(system),
         )
 

@@ -36,7 +36,7 @@ def start_margins(w: Any, fresh: Any) -> None:
         clear = (absolute(value) > FORMULA_EPS * largest) & (lanes(w.fired[m]) < 0.5)
         side = where(clear, where(value > 0.0, 1.0, -1.0), 0.0)
         put_where(fresh, w.side[m], side)
-        if w.kinds[m, 4] == 0:
+        if w.kinds[m, 5] == 0:
             put(w.side[m], 0.0)
         elif is_limit(w, m):
             unclear = where(side < -0.5, 1.0, unclear)
@@ -88,7 +88,7 @@ def may_cross(w: Any, good: Any) -> Any:
     evaluate(w, MARGINS, w.margin_end)
     close = same(0.0)
     for m in range(w.n_margins):
-        if w.kinds[m, 4] != 0:
+        if w.kinds[m, 5] != 0:
             side, before, now = lanes(w.side[m]), lanes(w.margin_first[m]), lanes(w.margin_quarters[0, m])
             nearest, curvature = smaller(side * before, side * now), same(0.0)
             for quarter in range(1, 4):
@@ -117,7 +117,7 @@ def _scan(w: Any, searched: Any) -> None:
         evaluate(w, MARGINS, w.margin)
         found = same(0.0)
         for m in range(w.n_margins):
-            if w.kinds[m, 4] == 0:
+            if w.kinds[m, 5] == 0:
                 continue
             crossed = searched & _crosses(w, m)
             found = where(crossed, 1.0, found)
@@ -134,7 +134,7 @@ def _scan(w: Any, searched: Any) -> None:
             largest = where(searched, larger(largest, absolute(value)), largest)
             put(w.margin_largest[m], largest)
             leaves = searched & (side == 0.0) & (absolute(value) > FORMULA_EPS * largest)
-            if w.kinds[m, 4] != 0:
+            if w.kinds[m, 5] != 0:
                 put_where(leaves, w.side[m], where(value > 0.0, 1.0, -1.0))
                 if is_limit(w, m):
                     put_where(leaves & (value < 0.0), w.unclear, 1.0)
@@ -196,7 +196,7 @@ def find_crossings(w: Any, good: Any, close: Any) -> None:
     """
     landing, whole = good & (lanes(w.onto) > 0.5), good & (lanes(w.onto) < 0.5)
     for m in range(w.n_margins):
-        if w.kinds[m, 4] != 0:
+        if w.kinds[m, 5] != 0:
             largest = lanes(w.margin_largest[m])
             put_where(whole, w.margin_largest[m], larger(largest, absolute(lanes(w.margin_end[m]))))
     close = close & good

@@ -326,7 +326,7 @@ def _run_segments(w: Any, i: int) -> int:
         w.least[j] = extremes[j] if extremes.shape[0] > 0 else np.inf
         w.largest[j] = extremes[w.n + j] if extremes.shape[0] > 0 else -np.inf
     for m in range(w.n_margins):
-        w.active[m] = w.kinds[m, 4]
+        w.active[m] = w.kinds[m, 5]
     w.arc_end = w.outputs_end = np.inf
     for segment in range(segments.shape[0] - 1):
         w.base, w.tau = segments[segment], 0.0

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.compile.program import MOST_RATE_STATES, Program
 from surfacechem.solve.contract import (
-    NO_EDGES,
     Array,
     Counters,
     EdgeCourse,
@@ -30,6 +29,7 @@ from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.stepper import (
     ARCS,
     COLUMNS,
+    EDGE_WORDS,
     END,
     EVENTS,
     FIRST_COUNTER,
@@ -56,10 +56,7 @@ _floats = partial(np.ascontiguousarray, dtype=float)
 @lru_cache(maxsize=256)
 def _kinds(margins: tuple[Guard, ...], active: tuple[bool, ...] | None = None) -> NDArray[np.int64]:
     flags = active or (True,) * len(margins)
-    rows = [
-        (m.terminal, m.direction, m.smooth, m.strict, is_active, m.domain)
-        for m, is_active in zip(margins, flags, strict=True)
-    ]
+    rows = [(*margin, is_active) for margin, is_active in zip(margins, flags, strict=True)]
     return np.array(rows, np.int64).reshape(-1, 6)
 
 
@@ -84,10 +81,14 @@ def _peaks(problem: Problem) -> Array:
     return np.concatenate((none if accounts is None else accounts, unseen if guards is None else guards, *extremes))
 
 
-def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[NDArray[Any]]:
+NO_WORDS = np.zeros(EDGE_WORDS, np.int64)
+"""Addresses and lengths of tables without edges."""
+
+
+def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables | None) -> Sequence[NDArray[Any]]:
     """Return the tables of a program, with those of edges."""
-    if edges is NO_EDGES:
-        return *tables, edges.words
+    if edges is None:
+        return *tables, NO_WORDS
     sizes, code, *others = tables
     sizes, code = sizes.copy(), np.concatenate([code, edges.code])
     sizes[-3:] = edges.sizes
@@ -95,7 +96,7 @@ def _with_edges(tables: Sequence[NDArray[Any]], edges: EdgeTables) -> Sequence[N
 
 
 def _usual_room(problem: Problem, steps: int, events: int) -> Room:
-    ends = problem.edges is NO_EDGES and all(margin.terminal for margin in problem.margins)
+    ends = problem.edges is None and all(margin.terminal for margin in problem.margins)
     # Pages that are never read are cleared all the same.
     rows = min(events, len(problem.margins)) if ends else events
     return steps * problem.record_steps, rows, INSIDE_ROWS * bool(problem.line_error), events
@@ -119,7 +120,7 @@ def batch_of(
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
     arcs = jumps = _no_rows(count)
     step_rows, event_rows, rows, jump_rows = room or _usual_room(problem, STEP_ROWS, EVENT_ROWS)
-    if problem.edges is not NO_EDGES:
+    if problem.edges is not None:
         arcs = np.empty((count, event_rows + len(problem.parameters), 5 + program.n_parameters))
         jumps = np.empty((count, jump_rows, 3 + problem.edges.sizes[0] + 2 * program.n_inputs))
     return Batch(
@@ -190,18 +191,16 @@ class Radau(Solver):
             # Common to the problems of a batch, in addition to the model and its margins.
             shape = len(problem.segments), problem.atol.tobytes(), problem.rtol
             interior = problem.line_error and (problem.line_error, problem.elapsed)
-            crosses = problem.edges is not NO_EDGES
-            alike.setdefault((*shape, problem.active, problem.continued, interior, crosses), []).append(i)
+            alike.setdefault((*shape, problem.active, problem.continued, interior, bool(problem.edges)), []).append(i)
         most = min(CHUNK, -(-len(problems) // threads))
         chunks = [group[k : k + most] for group in alike.values() for k in range(0, len(group), most)]
+        found: dict[int, Result] = {}
+
+        def solve(chunk: list[int]) -> None:
+            found.update(zip(chunk, _solved([problems[i] for i in chunk]), strict=True))
+
         with ThreadPoolExecutor(threads) as pool:
-            spread = pool.map if len(chunks) > 1 else map
-            solved = spread(lambda chunk: _solved([problems[i] for i in chunk]), chunks)
-            found = {
-                i: result
-                for chunk, each in zip(chunks, solved, strict=True)
-                for i, result in zip(chunk, each, strict=True)
-            }
+            list((pool.map if len(chunks) > 1 else map)(solve, chunks))
         return [found[i] for i in range(len(problems))]
 
 
@@ -327,7 +326,7 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
     """
     rows, nothing = np.zeros((1, 0)), _no_rows(len(ends))
     return Batch(
-        *program.tables, NO_EDGES.words,
+        *program.tables, NO_WORDS,
         np.array((1.0, 0.0, 0.0, 0.0, 0.0)), np.ones(program.n), _kinds(()), np.empty(0, np.int64),
         ends, table, np.zeros(0), rows, rows, rows, ends, counts,
         *(nothing,) * 4, rows, *(nothing,) * 2,

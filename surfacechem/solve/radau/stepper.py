@@ -48,7 +48,7 @@ BATCH: dict[str, tuple[Any, int]] = {
     # the method
     "settings": (float, 1),
     "atol": (float, 1),
-    # guards: a row (terminal, direction, smooth, strict, active, domain) for each
+    # guards: a row (terminal, direction, smooth, strict, domain, active) for each
     "kinds": (np.int64, 2),
     # most steps, one number for all runs or one each
     "max_steps": (np.int64, 1),
