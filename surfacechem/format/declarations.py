@@ -23,7 +23,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, dataclass, field
 from functools import cache
-from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from surfacechem import laws
@@ -507,7 +506,7 @@ class Section:
 
     tree = Tree(None, Place())
     """The section as a tree."""
-    more: Mapping[str, Any] = MappingProxyType({})
+    more: Mapping[str, Any] = {}
     """Values of keys other than those that the class declares."""
 
     def __init__(self, **values: Any) -> None:

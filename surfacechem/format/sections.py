@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any, cast
 
 from surfacechem import laws, references
@@ -197,9 +196,7 @@ class NeighbourSection(Section):
     """state in which a phase beside the surface is held, each value a number or a history"""
 
     pressure: Load | None = key(Prescribed("Pa"), "pressure [Pa]")
-    composition: Mapping[str, Load] = key(
-        Entries(others=Prescribed("1")), "mole fractions by species", MappingProxyType({})
-    )
+    composition: Mapping[str, Load] = key(Entries(others=Prescribed("1")), "mole fractions by species", {})
     rest: str = key(Text(), "the species whose mole fraction is what the others leave", "")
     electric_potential: Load | None = key(
         Prescribed("V"), "electric potential against the surface [V]", name="electric-potential"
@@ -224,7 +221,7 @@ class MechanismSection(Section):
     neighbours: Mapping[str, NeighbourSection] = key(
         Entries(others=Nested(NeighbourSection)),
         "states in which the phases beside the surface are held, by name",
-        MappingProxyType({}),
+        {},
     )
     species: Tree | None = key(
         Deferred(Entries(others=Entries(others=ByShape(amount("1"), NUMBERS)))), "other numbers of species, by name"
@@ -587,7 +584,7 @@ class KeepSection(Section):
     reach: Mapping[str, float] = key(
         Entries(others=amount("[x]"), names=lambda case: case.units, what="variables"),
         "values by variable, the time at which each is first reached is kept: `reach: {phi: 0.95}`",
-        MappingProxyType({}),
+        {},
     )
     balances: str = key(
         OneOf("choice", lambda: (ALL, NONE)),
@@ -607,7 +604,7 @@ class SweepSection(Section):
     over: Mapping[str, Tree] = key(
         _by_path(SWEPT, f"a sweep needs `over`: values of parameters, for example `{OVER}`"),
         f"values of parameters by path, a list or `{{from, to, points, spacing}}`, for example `{OVER}`",
-        MappingProxyType({}),
+        {},
     )
     combine: str = key(
         OneOf("way to combine", lambda: (GRID, "zip")), "every value with every other, or the first of each, ...", GRID
@@ -656,18 +653,18 @@ class Document(Section):
         Entries(others=Nested(BodySection), pattern=BODY_NAME, words="two bodies by name"),
         "the two bodies, of which the first is body 1, for example `bodies: {lower: {...}, upper: {...}}`; where the "
         "interface has a given temperature they may be left out, and have it too",
-        MappingProxyType({}),
+        {},
     )
     interface: InterfaceSection = key(Nested(InterfaceSection), default=InterfaceSection())
     surface: SurfaceSection | None = key(Nested(SurfaceSection, per_area=True))
     heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "heat paths", ())
     surroundings: SurroundingsSection | None = key(Nested(SurroundingsSection))
     mechanics: MechanicsSection = key(Nested(MechanicsSection), default=MechanicsSection())
-    loading: Mapping[str, Load] = key(LOADING, "prescribed variables", MappingProxyType({}))
+    loading: Mapping[str, Load] = key(LOADING, "prescribed variables", {})
     programme: Sequence[Mapping[str, StageSection]] = key(
         ListOf(STAGE, "- approach: {w_n: -1 um/s, until: {p: 10 kPa}}"), "stages of the loading", ()
     )
-    initial: Mapping[str, Any] = key(INITIAL, "initial values of what evolves", MappingProxyType({}))
+    initial: Mapping[str, Any] = key(INITIAL, "initial values of what evolves", {})
     run: RunSection | None = key(Nested(RunSection))
     reference: Tree | None = key(Deferred(REFERENCE), "an exact solution to compare with")
     sweep: SweepSection | None = key(Nested(SweepSection))

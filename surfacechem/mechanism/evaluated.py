@@ -7,10 +7,9 @@ molecules, enthalpy and entropy from them without a change of their state.
 
 from __future__ import annotations
 
-import copy
 import math
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -280,7 +279,8 @@ class NeighbourReaction(EvaluatedReaction):
 class SurfaceEngine:
     """A Cantera surface that evaluates the net rates of some of its reactions, and what they take from neighbours.
 
-    ``reactions`` are the laws of all its reactions, in its order.
+    ``reactions`` are the laws of all its reactions, in its order; ``again`` makes an equal engine, and is what a pickle
+    keeps, since Cantera's surfaces cannot be pickled.
     """
 
     def __init__(
@@ -289,8 +289,9 @@ class SurfaceEngine:
         species: Sequence[Species],
         reactions: Sequence[RateLaw],
         neighbours: Mapping[str, Neighbour],
+        again: Callable[[], Any],
     ) -> None:
-        self.surface = surface
+        self.surface, self._again = surface, again
         self.positions = np.array([i for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)])
         open_ones = [i for i, law in enumerate(reactions) if isinstance(law, NeighbourReaction)]
         given = ("value", self.positions), ("enthalpy", open_ones), ("gibbs", open_ones)
@@ -313,6 +314,10 @@ class SurfaceEngine:
         self._brought: list[tuple[object, ...]] = [()]
         """Engine, temperature, amount and states set last on the surface, since several engines may share it."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the call that reads the surface again, and the states of its neighbours."""
+        return _read_again, (self._again, {held.phase.name: held.given for held in self.held})
+
     def with_neighbours(self, neighbours: Mapping[str, Neighbour]) -> SurfaceEngine:
         """Return a copy with other states of neighbours; InputError if no reaction has a neighbour of that name."""
         known = {held.phase.name: held.given for held in self.held}
@@ -329,7 +334,8 @@ class SurfaceEngine:
 
     def _holding(self, states: Mapping[str, Neighbour]) -> SurfaceEngine:
         """Return a copy with other states of some neighbours."""
-        made = copy.copy(self)
+        made = SurfaceEngine.__new__(SurfaceEngine)  # no copy, which would read the surface again
+        vars(made).update(vars(self))
         made.held = [HeldPhase(x.phase, states[x.phase.name]) if x.phase.name in states else x for x in self.held]
         made._lay_out()
         return made
@@ -426,3 +432,7 @@ class SurfaceEngine:
                 found = np.full(len(self.gives), math.nan)
             self._last = values, found
             return found
+
+
+def _read_again(again: Callable[[], Any], states: Mapping[str, Neighbour]) -> Any:
+    return again()._holding(states)

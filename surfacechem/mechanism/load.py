@@ -140,7 +140,8 @@ def _loaded(
     # Half as many bonds fit if each takes two sites, so that phi is the coverage of bonds in both cases.
     possible = density / min((item.sites for item in chosen), default=1.0)
     reactions = tuple(_reaction(source, f"R{i}", *one, species) for i, one in enumerate(kept, start=1))
-    engine = SurfaceEngine(surface, species, reactions, neighbours or {})
+    again = partial(_engine, file, text, phase, bonds, place, evaluate, neighbours)
+    engine = SurfaceEngine(surface, species, reactions, neighbours or {}, again)
     mixture_place = source.place(entry, path="interface.mechanism")
     mixture = IdealMixture(species=species, temperatures=engine.temperatures, place=mixture_place)
     return Mechanism(
@@ -159,6 +160,13 @@ def _loaded(
         remarks=(*said, *odd),
         follows_from_text=not engine.gives and _is_whole(source, entry, reactions),
     )
+
+
+def _engine(*given: Any) -> Engine:
+    """Return the engine of a mechanism that has one."""
+    engine = _loaded(*given).engine
+    assert engine is not None
+    return engine
 
 
 def _is_whole(source: Source, phase: Any, reactions: Sequence[RateLaw]) -> bool:

@@ -118,7 +118,7 @@ def test_the_error_is_found_once_and_when_it_is_asked_for(simulation, monkeypatc
     assert len(asked) == 1
 
 
-@pytest.mark.parametrize("name", ["exothermic", "stick-slip"])
+@pytest.mark.parametrize("name", ["exothermic", "stick-slip", "lithium-charging"])
 def test_a_solution_comes_back_from_a_pickle_as_it_was(name):
     solution = surfacechem.run(name, ["run.outputs=21"])
     again = pickle.loads(pickle.dumps(solution))
@@ -128,7 +128,14 @@ def test_a_solution_comes_back_from_a_pickle_as_it_was(name):
     assert np.array_equal(repeated.result.outputs, solution.trajectory.result.outputs)
 
 
-@pytest.mark.parametrize(("name", "over"), [("force-spectroscopy", None), ("debonding", {"initial.T": [300, 310]})])
+@pytest.mark.parametrize(
+    ("name", "over"),
+    [
+        ("force-spectroscopy", None),
+        ("debonding", {"initial.T": [300, 310]}),
+        ("lithium-charging", {"initial.V_electron": [-2.95, -2.9]}),
+    ],
+)
 def test_a_sweep_comes_back_from_a_pickle_as_it_was(name, over):
     swept = surfacechem.load(name).sweep(over)
     again = pickle.loads(pickle.dumps(swept))
