@@ -25,7 +25,7 @@ from surfacechem.solve import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.lanes.lane_batch import solve_batch
-from surfacechem.solve.radau.solver import Room, consistent, put_rates, solve_arrays
+from surfacechem.solve.radau.solver import Room, consistent, peaks_before, put_rates, solve_arrays
 from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
 from surfacechem.solve.run import Discontinuities, Model, Run
 from surfacechem.tolerances import EPS, GUARD_EPS, MICROMETRE, MIN_RTOL, PICOMETRE
@@ -78,7 +78,7 @@ def is_array(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     jumps = system.solves_jumps or (plan.load and len(problem.segments) > 2)
     plain = run.max_seconds is None and not run.steady and model.program.external is None
     own = plain and run.solver in (IMPLICIT, EXPLICIT)
-    shared = model.passing.is_empty or not (plan.load or model.passing.reads & set(plan.paths))
+    shared = model.passing.function is None or not (plan.load or model.passing.reads & set(plan.paths))
     shared = shared and not set(plan.paths) & set(system.cycles)
     return own and shared and not jumps and _starts_as_given(system, set(plan.paths))
 
@@ -152,8 +152,8 @@ class ArrayRuns:
         self.keeps_steps = self.keeps_extremes or bool(keep.reach and len(self.breaks))
         self.impacts = [len(model.margins) + j for j, edge in enumerate(system.edges) if edge.is_impact]
         """Columns of the guards of impacts."""
-        self.no_peaks = np.zeros((1, model.program.n_ledger + model.program.n_margins))
-        """Largest accounts and guards before any evaluation: zero."""
+        self.no_peaks = peaks_before(self.problem)[None]
+        """Largest accounts and guards before any evaluation."""
         times = self.problem.times
         self.shape = times if self.keeps_extremes or keep.series else times[[0, -1]][: 2 * keep.balances]
         """Output times of a run of the case: all, or the first and the last, or none."""

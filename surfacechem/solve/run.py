@@ -36,7 +36,7 @@ from surfacechem.solve.hybrid import Flow, Hybrid, carried, solve_together, with
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import consistent, put_rates
 from surfacechem.solve.segments import BETWEEN_POINTS, LARGEST_SLACK, Passing
-from surfacechem.tolerances import ATOL_OF_SCALE, DEFAULT_RTOL, EPS, FINER_BY, LINE_ERROR, SQRT_EPS
+from surfacechem.tolerances import ATOL_OF_SCALE, DEFAULT_RTOL, EPS, FINER_BY, FORMULA_EPS, LINE_ERROR, SQRT_EPS
 
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
 """Groups of accounts whose quadrature errors are compared with a common scale."""
@@ -360,8 +360,7 @@ class Trajectory:
         if (result.outputs >= least).all() and (steps is None or (steps.y >= least).all()):
             return self
         steps = steps and replace(steps, y=np.maximum(steps.y, least))
-        clipped = result._replace(outputs=np.maximum(result.outputs, least), steps=steps)
-        return replace(self, result=clipped)
+        return replace(self, result=result._replace(outputs=np.maximum(result.outputs, least), steps=steps))
 
     @cached_property
     def quantities(self) -> Array:
@@ -554,6 +553,10 @@ class Model:
         start = stable_guess(system, self.program, y, parameters[0])
         if system.equilibria:  # given gaps are first guesses only; those found must be admissible too
             self._limits.check(start, parameters[0])
+        atol = self._sizes * (run.atol if run.atol is not None else ATOL_OF_SCALE * run.rtol)
+        least = np.zeros(self.program.n_margins)
+        # The sign of a state below its tolerance is unknown, as that of a margin below its roundoff.
+        least[self._peaks[0]] = atol[self._peaks[1]] / FORMULA_EPS
         return Problem(
             program=self.program if run.accounts or self.jumper else self._without_accounts,
             y0=start,
@@ -561,8 +564,9 @@ class Model:
             segments=segments,
             parameters=parameters,
             rtol=run.rtol,
-            atol=self._sizes * (run.atol if run.atol is not None else ATOL_OF_SCALE * run.rtol),
+            atol=atol,
             margins=self._guards,
+            margin_peaks=least,
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
@@ -585,6 +589,13 @@ class Model:
     @cached_property
     def _without_accounts(self) -> Program:
         return replace(self.program, ledger=None, n_ledger=0, groups=())
+
+    @cached_property
+    def _peaks(self) -> Index:
+        """Margins at whose zeros only steps end and that are states, and these states."""
+        columns = {state.symbol: j for j, state in enumerate(self.system.states)}
+        found = [(i, columns[m.expression]) for i, m in enumerate(self.margins) if m.peak and m.expression in columns]
+        return np.array(found, int).reshape(-1, 2).T
 
     @cached_property
     def _guards(self) -> tuple[Guard, ...]:

@@ -123,23 +123,19 @@ class Passing:
         )
         self.reads = {system.parameters[j].path for j in self._columns}
         """Paths of the parameters that these depend on."""
-        self._function: Function | None = None
+        self.function: Function | None = None
+        """What passes narrow features, as a function of the time and these parameters; None if nothing does."""
         if turns or places:
             symbols = [system.parameters[j].symbol for j in self._columns]
-            self._function = compile_function([system.t, *symbols], [*turns, *places])
+            self.function = compile_function([system.t, *symbols], [*turns, *places])
         self._found = lru_cache(maxsize=8)(self._find)
-
-    @property
-    def is_empty(self) -> bool:
-        """True if there are none."""
-        return self._function is None
 
     def pieces(self, segments: Array, table: Array, frequency: float, max_steps: int) -> tuple[Array, Array]:
         """Return the segments, whose parameters are ``table``, cut at these times, and the new parameters.
 
         ``frequency`` [1/s] is the highest of a prescribed variable.
         """
-        if self._function is None:
+        if self.function is None:
             return segments, table
         parts = max(TURN_PARTS / (segments[-1] - segments[0]), PARTS_PER_CYCLE * frequency)
         searched = np.minimum(segments, segments[0] + PARTS_PER_STEP * max_steps / parts)
@@ -149,8 +145,7 @@ class Passing:
         right = np.searchsorted(segments, found)
         gaps = np.minimum(found - segments[right - 1], segments[right] - found)
         found = found[gaps > GUARD_EPS * found]
-        apart = np.diff(found, prepend=0.0) > GUARD_EPS * found
-        found = found[apart]
+        found = found[np.diff(found, prepend=0.0) > GUARD_EPS * found]
         within = np.searchsorted(segments, found) - 1
         return np.insert(segments, within + 1, found), np.insert(table, within + 1, table[within], axis=0)
 
@@ -173,8 +168,8 @@ class Passing:
 
     def _zeros(self, low: Array, high: Array, values: Array, which: slice) -> Array:
         """Return the times at which functions change sign in these intervals, the first time beyond each change."""
-        assert self._function is not None
-        function = self._function
+        assert self.function is not None
+        function = self.function
 
         def at(t: Array, rows: Array) -> Array:
             return np.sign(function(np.column_stack([t, rows]))[:, which])

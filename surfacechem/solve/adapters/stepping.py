@@ -280,7 +280,7 @@ class _Run:
         inputs = len(NODES) * self.view.program.n_inputs
         # Algebraic variables are searched from those of the last step, which must be close: one step at a time.
         largest = 1 if len(self.view.algebraic) else max(FIRST_TOGETHER, min(MOST_TOGETHER, MOST_INPUTS // inputs))
-        eventful = bool(self.fired) or self.problem.margin_peaks is not None
+        eventful = bool(self.fired) or self.problem.exchanged is not None
         start, most = self.t, min(largest, FIRST_TOGETHER if eventful else method.together)
         while self.t < end and self._over_budget() is None:
             before = time.perf_counter()

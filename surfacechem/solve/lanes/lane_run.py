@@ -192,9 +192,9 @@ def _choose_sizes(w: Any) -> None:
     t, h, landing = lanes(w.t), lanes(w.proposed), lanes(w.landing) > 0.5
     left = lanes(w.end) - t
     remaining = smaller(lanes(w.aim) - t, left)
-    # No tiny last step: two equal steps are better than a full one and a remainder.
+    # No tiny last step: two equal ones are better than a full one and a remainder, unless that is roundoff of time.
     whole = where(2.0 * h > remaining, 0.5 * remaining, h)
-    whole = where(h >= remaining * (1.0 - SQRT_EPS), remaining, whole)
+    whole = where(h >= remaining * (1.0 - SQRT_EPS) - ULPS * t, remaining, whole)
     h = smaller(where(landing, h, whole), left)  # a step onto a guard may aim a rounding beyond
     put(w.h, where(lanes(w.busy) > 0.5, h, 0.0))
     put(w.last, where(h == left, 1.0, 0.0))

@@ -50,7 +50,7 @@ from surfacechem.solve.radau.work import (
     put,
     row_of,
 )
-from surfacechem.tolerances import FEW_EPS, LOOSE_RTOL, MICROMETRE, NEGLIGIBLE, PICOMETRE, RUN_EPS, SQRT_EPS
+from surfacechem.tolerances import FEW_EPS, LOOSE_RTOL, MICROMETRE, NEGLIGIBLE, PICOMETRE, RUN_EPS, SQRT_EPS, ULPS
 
 MOST_REFUSED = 40
 """Steps that the ledger may reject since the last restart, in addition to half of all: its error may be noise, which
@@ -264,8 +264,8 @@ def _run_segment(w: Any, i: int, end: float, continued: bool) -> int:
             h, size_last, norm_last, aim = first_size(w, end - w.base), 0.0, 1.0, np.inf
         left = (end - w.base) - w.tau
         remaining = min(left, aim - w.tau)
-        # No tiny last step: two equal steps are better than a full one and a remainder.
-        if h >= remaining * (1.0 - SQRT_EPS):
+        # No tiny last step: two equal ones are better than a full one and a remainder, unless that is roundoff of time.
+        if h >= remaining * (1.0 - SQRT_EPS) - ULPS * w.tau:
             h = remaining
         elif 2.0 * h > remaining:
             h = 0.5 * remaining

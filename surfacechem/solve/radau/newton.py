@@ -293,6 +293,40 @@ def _correct(w: Any) -> float:
 
 
 @compiled
+def _is_astray(w: Any, stages: int, h: float) -> bool:
+    """True if Newton's method ends at a wrong state, where equations are so much softer than the matrix that its
+    corrections are nothing.
+
+    A correction far below the roundoff of the change of a state is suspect. The equations at the end of the step are
+    then open by more than all states change them within their tolerances.
+    """
+    suspect = False
+    for m in range(w.n):
+        moved = change = 0.0
+        for i in range(stages):
+            moved, change = max(moved, abs(w.z[i, m])), max(change, abs(w.g[i, m]))
+        suspect = suspect or (moved > w.weight[m] and change < NEGLIGIBLE * EPS * moved)
+    if not suspect:
+        return False
+    set_stage(w, stages - 1, h)
+    evaluate(w, RESIDUAL, w.rhs)
+    clear(w.columns)
+    for j in range(w.core):
+        y, ydot = w.inputs[1 + j], w.inputs[1 + w.n + j]
+        w.inputs[1 + j] = y + w.weight[j]
+        w.inputs[1 + w.n + j] = ydot + w.weight[j] * tables.GAMMA[w.member] / h
+        evaluate(w, RESIDUAL, w.delta)
+        w.inputs[1 + j], w.inputs[1 + w.n + j] = y, ydot
+        for i in range(w.core):
+            w.columns[i] += abs(w.delta[i] - w.rhs[i])
+    w.residuals += w.core + 1
+    astray = False
+    for i in range(w.core):
+        astray = astray or abs(w.rhs[i]) > w.columns[i]
+    return astray
+
+
+@compiled
 def solve_stages(w: Any, h: float) -> int:
     """Iterate to the tolerance, or to roundoff where that is larger; store the rate of contraction.
 
@@ -328,6 +362,9 @@ def solve_stages(w: Any, h: float) -> int:
         # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
         believed = iteration > 0 or w.rtol < tables.COARSE_RTOL
         if (believed and contraction * norm <= NEWTON_PART) or norm <= ROUNDINGS * w.roundoff:
+            if _is_astray(w, s, h):
+                w.h_last = 0.0  # predict nothing
+                return DIVERGED
             w.contraction = contraction
             return CONVERGED
         norm_last = max(norm, TINY)

@@ -71,7 +71,7 @@ def _zeros(count: int) -> Array:
     return np.zeros(count)
 
 
-def _peaks(problem: Problem) -> Array:
+def peaks_before(problem: Problem) -> Array:
     """Return the largest accounts and guards, and the extremes, of the part that a problem continues; zeros if none."""
     accounts, guards = problem.exchanged, problem.margin_peaks
     none, unseen = _zeros(problem.program.n_ledger), _zeros(problem.program.n_margins)
@@ -147,7 +147,7 @@ def _run_one(problem: Problem, room: Room | None = None) -> Any:
     y0, parameters, segments, times = (
         _floats(values)[None] for values in (problem.y0, problem.parameters, problem.segments, problem.times)
     )
-    columns = y0, parameters, np.array((problem.spacing,)), _peaks(problem)[None], segments, times
+    columns = y0, parameters, np.array((problem.spacing,)), peaks_before(problem)[None], segments, times
     batch = batch_of(problem, columns, room or _usual_room(problem, ALONE_ROWS, ALONE_ROWS))
     if problem.max_seconds is None:
         stepper.LOOP.run(batch)
@@ -227,7 +227,7 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
         alike = all(np.array_equal(values, rows[0]) for values in rows[1:])
         return _floats(rows[0])[None] if alike else np.array(rows, dtype=float)
 
-    own = [(each.y0, each.parameters, each.spacing, _peaks(each)) for each in problems]
+    own = [(each.y0, each.parameters, each.spacing, peaks_before(each)) for each in problems]
     y0, parameters, spacing, peaks = (np.array(values, float) for values in zip(*own, strict=True))
     most = max(len(each.times) for each in problems)
     # Outputs are padded with infinite times, which no run reaches.
