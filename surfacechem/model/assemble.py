@@ -128,8 +128,7 @@ def perturbed(scene: Scene) -> Scene:
 
 def _with_laws(scene: Scene, change: Callable[[Any], Any]) -> Scene:
     """Return the scene with ``change`` applied to its potentials and heat paths."""
-    potentials = tuple(map(change, scene.interface.potentials))
-    interface = replace(scene.interface, potentials=potentials)
+    interface = replace(scene.interface, potentials=tuple(map(change, scene.interface.potentials)))
     return replace(scene, interface=interface, heat=tuple(map(change, scene.heat)))
 
 

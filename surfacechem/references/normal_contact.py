@@ -359,8 +359,7 @@ class OverdampedPullOff(CohesiveZoneOnSpring):
     @cached_property
     def end_gap(self) -> float:
         """Gap [m] at `end_time`."""
-        final = float(self.gap(np.array([self.w]), self.folds[1].g, math.inf)[0])
-        return 0.5 * (self.fold.g + final)
+        return 0.5 * (self.fold.g + float(self.gap(np.array([self.w]), self.folds[1].g, math.inf)[0]))
 
     @property
     def end_time(self) -> float:

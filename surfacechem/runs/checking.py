@@ -57,8 +57,7 @@ class Checked:
     def __str__(self) -> str:
         """The errors in words."""
         known = f"{self.error:.2g} of {self.count} runs ({self.source})" if self.unknown < self.count else ""
-        unknown = unknown_in(self.unknown, self.why)
-        return "; ".join(filter(None, (known, unknown)))
+        return "; ".join(filter(None, (known, unknown_in(self.unknown, self.why))))
 
 
 def checked_arrays(size: int, count: int) -> tuple[dict[str, int], dict[str, StoredArray]]:

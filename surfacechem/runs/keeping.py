@@ -120,8 +120,7 @@ def reaching(system: System, keep: Keep) -> System:
     for name, value in (keep.reach or {}).items():
         expression = symbols.get(name) or system.find(name).expression
         margins.append(Margin(f"{REACHES}{name}", expression - value, f"{name} reaches {value:g}", terminal=False))
-    ledger = system.ledger if keep.balances else ()
-    return replace(system, margins=(*system.margins, *margins), ledger=ledger)
+    return replace(system, margins=(*system.margins, *margins), ledger=system.ledger if keep.balances else ())
 
 
 def reason_table(system: System) -> list[str]:

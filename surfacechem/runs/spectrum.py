@@ -48,8 +48,7 @@ def history(system: System, variable: str) -> Expression:
 
 def evolves_bonds(system: System) -> bool:
     """True if bonds evolve."""
-    phi = symengine.Symbol("phi")
-    return bool(system.expand(phi).free_symbols & {state.symbol for state in system.states})
+    return bool(system.expand(symengine.Symbol("phi")).free_symbols & {state.symbol for state in system.states})
 
 
 def breaks_bonds(system: System) -> bool:

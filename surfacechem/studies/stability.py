@@ -207,8 +207,7 @@ def prepared(problem: Trial, rtol: float = STUDY_RTOL) -> Callable[[str], Attemp
 def read(problem: Trial) -> Case:
     """Return the case of a problem with its changes."""
     changes = {**problem.changes, "run": {"times": list(problem.times)}}
-    case = cases.load(problem.case, changes)
-    return replace(case, reference=None)  # the regime has its own expectation
+    return replace(cases.load(problem.case, changes), reference=None)  # the regime has its own expectation
 
 
 def _judged(expected: Expectation, rtol: float, known: float, done: Trajectory | Exception) -> Attempt:
