@@ -8,6 +8,7 @@ Cantera supports and the compiled path does not, with advice, and the entries wh
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from itertools import chain
 from typing import Any
 
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
@@ -27,7 +28,7 @@ from surfacechem.mechanism.source import (
     sides,
     unitless,
 )
-from surfacechem.mechanism.thermo import CAPACITY_KEYS, COEFFICIENTS, KEY, MODEL_KEYS, PAIRED_KEYS
+from surfacechem.mechanism.thermo import CAPACITY_KEYS, COEFFICIENTS, KEY, MODEL_KEYS
 
 _words = str.split
 
@@ -283,7 +284,8 @@ class PhaseCheck:
         """Check a dependence of thermo on one coverage: keys of its model, required pairs of keys, units."""
         error, model = self.source.error, str(node.get("model"))
         refuse_unknown([model], MODEL_KEYS, f"{title}: no model '{{}}'", self.source.place(node, "model"))
-        self._keys(node, ("model", "units", *MODEL_KEYS[model], *CAPACITY_KEYS), title)
+        groups = CAPACITY_KEYS, *MODEL_KEYS[model]
+        self._keys(node, ("model", "units", *chain(*groups)), title)
         given = {**self.source.defaults(entry), **(node.get("units") or {})}
         for key, value in node.items():
             if key.endswith("-coefficients") and (not isinstance(value, list) or len(value) != COEFFICIENTS):
@@ -296,7 +298,7 @@ class PhaseCheck:
                     "`units: {energy: eV, quantity: molec}` beside it."
                 )
                 raise error(message, node, key)
-        for group in PAIRED_KEYS:
+        for group in groups:
             there, missing = set(group) & set(node), set(group) - set(node)
             if there and missing:
                 first, needed = min(there, key=group.index), min(missing, key=group.index)

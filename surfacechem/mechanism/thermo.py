@@ -321,27 +321,21 @@ class Interaction(NamedTuple):
 
 KEY = "coverage-dependencies"
 
-MODEL_KEYS = {
-    "linear": ("enthalpy", "entropy"),
-    "polynomial": ("enthalpy-coefficients", "entropy-coefficients"),
-    "piecewise-linear": (
-        *("enthalpy-low", "enthalpy-high", "enthalpy-change"),
-        *("entropy-low", "entropy-high", "entropy-change"),
-    ),
-    "interpolative": ("enthalpy-coverages", "enthalpies", "entropy-coverages", "entropies"),
-}
-"""Keys of each model."""
-
 CAPACITY_KEYS = ("heat-capacity-a", "heat-capacity-b")
+
+MODEL_KEYS: Mapping[str, tuple[tuple[str, ...], ...]] = {
+    "linear": (("enthalpy",), ("entropy",)),
+    "polynomial": (("enthalpy-coefficients",), ("entropy-coefficients",)),
+    "piecewise-linear": (
+        ("enthalpy-low", "enthalpy-high", "enthalpy-change"),
+        ("entropy-low", "entropy-high", "entropy-change"),
+    ),
+    "interpolative": (("enthalpy-coverages", "enthalpies"), ("entropy-coverages", "entropies")),
+}
+"""Keys of each model, in groups of which each key requires the others."""
 
 COEFFICIENTS = 4
 """Number of coefficients of a polynomial in Cantera."""
-
-PAIRED_KEYS = (
-    *(("heat-capacity-a", "heat-capacity-b"), ("enthalpy-coverages", "enthalpies"), ("entropy-coverages", "entropies")),
-    *(("enthalpy-low", "enthalpy-high", "enthalpy-change"), ("entropy-low", "entropy-high", "entropy-change")),
-)
-"""Groups of keys of which each requires the others."""
 
 
 def interactions(source: Source, entry: Any, variables: Mapping[str, str]) -> tuple[Interaction, ...]:
