@@ -386,17 +386,12 @@ class AffinityReaction(LawReaction):
         names = ("mu", *self._formula(self._forward).__signature__.parameters)
         return Formula(names, lambda values: self.net(self._forward(values), values["mu"], values["T_c"]))
 
-    def _forward(self, values: Mapping[str, Expression], shift: Expression = 0) -> Expression:
+    def _forward(self, values: Mapping[str, Expression]) -> Expression:
         # Amounts at full coverage: the coverages are in the affinity.
-        product = self.coefficient(values, shift)
+        product = self.coefficient(values, 0)
         for item in self.species:
             product *= values[item.concentration] ** plain(self.orders.get(item.variable, 0))
         return product
-
-    def _reverse(self, values: Mapping[str, Expression]) -> Expression:
-        affinity = self.standard_affinity(values["T_c"], values.get("g_n"), values)
-        changed = [(plain(nu), values[name]) for name, nu in self.change.items() if nu]
-        return self._forward(values, affinity + sum(nu * log_fraction(theta) for nu, theta in changed))
 
     def _log_forward(self, values: Mapping[str, Expression]) -> Expression:
         orders = ((values[item.concentration], self.orders.get(item.variable, 0)) for item in self.species)
