@@ -11,7 +11,7 @@ of the friction H by the shares :math:`s_k` of the moment.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -210,16 +210,9 @@ def _first(curve: Callable[[float], float], reached: float) -> float:
 class LoadPath:
     """The path of the sliding gaps as loads jump."""
 
-    def __init__(
-        self,
-        system: System,
-        equilibria: Equilibria,
-        heat: JumpHeat,
-        energy: Function,
-        stages: Sequence[tuple[str, list[int]]],
-    ) -> None:
-        self.system, self.equilibria, self.heat, self.energy = system, equilibria, heat, energy
-        self.moved = next((columns for axis, columns in stages if axis != "n"), [])
+    def __init__(self, equilibria: Equilibria, heat: JumpHeat, energy: Function, moved: list[int]) -> None:
+        self.system, self.equilibria, self.heat, self.energy = equilibria.system, equilibria, heat, energy
+        self.moved = moved
         """Columns among the inputs of the states that move along the interface."""
 
     @cached_property

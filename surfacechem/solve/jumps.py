@@ -224,7 +224,8 @@ class Jumper:
 
     @cached_property
     def _load_path(self) -> LoadPath:
-        return LoadPath(self.system, self.equilibria, self._heat, self._energy, self._stages)
+        moved = next((columns for axis, columns in self._stages if axis != "n"), [])
+        return LoadPath(self.equilibria, self._heat, self._energy, moved)
 
     @cached_property
     def _stages(self) -> list[tuple[str, list[int]]]:

@@ -494,10 +494,7 @@ def find_event(w: Any, h: float) -> float:
     # A fold may lie just beyond a guard: explicit steps have to pass their error test there too.
     tested = w.kinds[first, 2] == 1 or (w.explicit != 0 and w.kinds[first, 0] == 1)
     size = _refine(w, h, first, max(earliest, TINY), 1.0 if tested else np.inf)
-    if size == 0.0:
-        restore_sides(w)
-        return 0.0
-    if _mark_coincident(w, h, size, first):
+    if size == 0.0 or _mark_coincident(w, h, size, first):
         restore_sides(w)
         return 0.0
     short = _kink_at(w, first)

@@ -197,17 +197,12 @@ def choose_member(w: Any, slowest: float) -> bool:
     Source: Hairer & Wanner (1999), J. Comput. Appl. Math. 111: high order pays while the iteration is easy.
     """
     k = w.member
+    easy = w.easy_steps + 1 if w.theta < 0.05 else 0
     if w.theta > slowest:
-        w.easy_steps = 0
         w.member = max(0, k - 1)
-    elif w.theta < 0.05:
-        w.easy_steps += 1
-        if w.easy_steps >= 3:
-            w.member = min(k + 1, preferred_member(w.rtol))
-    else:
-        w.easy_steps = 0
-    if w.member != k:
-        w.easy_steps = 0
+    elif easy >= 3:
+        w.member = min(k + 1, preferred_member(w.rtol))
+    w.easy_steps = easy if w.member == k else 0
     return bool(w.member != k)
 
 

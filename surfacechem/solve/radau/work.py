@@ -276,39 +276,23 @@ def evaluate_at(w: Any, which: int, inputs: Any, result: Any) -> None:
     _call(w.code[which, 0], result.ctypes.data, inputs.ctypes.data, w.code[which, 1])
 
 
-@_intrinsic
-def _number(_context: Any, _address: Any) -> Any:
-    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        return builder.load(builder.inttoptr(args[0], _NUMBER.as_pointer()))
-
-    return types.float64(types.intp), generate
-
-
-@_intrinsic
-def _set_number(_context: Any, _address: Any, _value: Any) -> Any:
-    def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        builder.store(args[1], builder.inttoptr(args[0], _NUMBER.as_pointer()))
-        return context.get_dummy_value()
-
-    return types.void(types.intp, types.float64), generate
-
-
 @compiled
 def evaluate_jacobian(w: Any) -> None:
     """Evaluate the derivatives at the current inputs: core, border and bands, which are contiguous in memory."""
     evaluate(w, JACOBIAN, w.jacobian)
     if len(w.nonzeros) == 0:
         return
-    # From last to first, move each entry to its position, which is never before the one it was written to.
-    start, end = w.jacobian.ctypes.data, w.jacobian.size + w.border_derivatives.size + w.band_derivatives.size
+    # From last to first, move each entry to its position, which is never before the one it was written to. Compiled
+    # code checks no index: the first row reaches all of them.
+    entries, end = w.jacobian[0, 0], w.jacobian.size + w.border_derivatives.size + w.band_derivatives.size
     for k in range(len(w.nonzeros) - 1, -1, -1):
-        value, place = _number(start + 8 * k), w.nonzeros[k]
+        value, place = entries[k], w.nonzeros[k]
         for between in range(place + 1, end):
-            _set_number(start + 8 * between, 0.0)
-        _set_number(start + 8 * place, value)
+            entries[between] = 0.0
+        entries[place] = value
         end = place
     for between in range(end):
-        _set_number(start + 8 * between, 0.0)
+        entries[between] = 0.0
 
 
 @compiled
