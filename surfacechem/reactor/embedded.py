@@ -89,7 +89,7 @@ class InstantEvents:
     def __init__(self, model: Model, problem: Problem, evaluation: Evaluation) -> None:
         assert model.jumper is not None
         self.system, self.jumper = model.system, model.jumper
-        self.instant = Instant(model.system, model.jumper, problem, len(model.margins))
+        self.instant = Instant(model.jumper, problem)
         self.evaluation = evaluation
         """Present state and parameters of the scene."""
         self.loads: Array | None = None

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.model.system import START, System
+from surfacechem.model.system import START
 from surfacechem.quantities import GAPS
 from surfacechem.solve.contract import (
     Array,
@@ -116,9 +116,9 @@ class Arc(NamedTuple):
 class Hybrid:
     """One run of a system with edges."""
 
-    def __init__(self, system: System, jumper: Jumper, problem: Problem, first: int) -> None:
-        self.system, self.jumper, self.problem = system, jumper, problem
-        self.instant = Instant(system, jumper, problem, first)
+    def __init__(self, jumper: Jumper, problem: Problem) -> None:
+        self.system, self.jumper, self.problem = jumper.system, jumper, problem
+        self.instant = Instant(jumper, problem)
         self.arcs: list[Arc] = []
         self.outputs: list[States] = []
         """Outputs in the time and ledger of the run, with the arcs as segments."""
@@ -127,9 +127,9 @@ class Hybrid:
         self.deadline = None if problem.max_seconds is None else time.monotonic() + problem.max_seconds
         self._steps = self._outputs_written = 0
         """Steps taken and outputs written."""
-        self._gaps = np.array([state.name in GAPS for state in system.states])
+        self._gaps = np.array([state.name in GAPS for state in self.system.states])
         """Mask of the states that are gaps."""
-        self._start = next(j for j, p in enumerate(system.parameters) if p.path == START)
+        self._start = self.system.parameter_columns[START]
         """Column of the time at which an arc starts."""
         self._brief_arcs = 0
         """Number of consecutive brief arcs after a step size underflow."""

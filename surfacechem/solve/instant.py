@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 
 from surfacechem.model.automaton import REST_TIME_PATH, SLIP_PATH
-from surfacechem.model.system import System
 from surfacechem.solve.contract import CHATTER, FITTED_PART, RETURN_FACTOR, Array, Mask, Problem, Result, Status
 from surfacechem.solve.equilibria import BALANCED, Point, drift_of
 from surfacechem.solve.jump_heat import LoadStep
@@ -84,9 +83,10 @@ class Rebounds:
 class Instant:
     """The present moment of a run, with the jumps so far and the largest states."""
 
-    def __init__(self, system: System, jumper: Jumper, problem: Problem, first: int) -> None:
-        self.system, self.jumper, self.program = system, jumper, problem.program
-        self.first = first
+    def __init__(self, jumper: Jumper, problem: Problem) -> None:
+        self.system = system = jumper.system
+        self.jumper, self.program = jumper, problem.program
+        self.first = first = len(system.event_margins)
         """Index of the first edge among the guards; limits come before."""
         self.rtol = problem.rtol
         self.start, self.end = float(problem.segments[0]), float(problem.segments[-1])
@@ -211,7 +211,7 @@ class Instant:
         if t > self._peaks_reset + IDLE * self.end:
             self._peaks_reset, self._jumps_resolved, self.peaks = t, len(self.jumps), self.scales.copy()
             return True
-        column = next((j for j, p in enumerate(self.system.parameters) if p.path == REST_TIME_PATH), None)
+        column = self.system.parameter_columns.get(REST_TIME_PATH)
         if column is None or self.jumps[-1].edge.return_time is None or point.parameters[column] == t:
             return False
         point.parameters[column], self._jumps_resolved = t, len(self.jumps)
@@ -236,7 +236,7 @@ class Instant:
     def _closed(self, now: Array, active: Mask, sizes: Array, due: bool) -> list[int]:
         """Return the limits beyond which a jump has carried the state, except those of modes left at this moment."""
         # Beyond the domain of a law, even by roundoff, its values have no meaning.
-        margins = self.system.event_margins[: self.first]
+        margins = self.system.event_margins
         least = [0.0 if m.domain else -GUARD_EPS * size for m, size in zip(margins, sizes, strict=False)]
         closed = [i for i in range(self.first) if self.terminal[i] and active[i] and now[i] < least[i]]
         closed += [i for i in self.limits if active[i] and now[i] <= GUARD_EPS * sizes[i]]
@@ -248,7 +248,7 @@ class Instant:
     def _algebraic_limits(self) -> set[int]:
         """Limits that read algebraic states, which are found anew as modes change."""
         found = {state.symbol for state in self.system.states if state.algebraic}
-        read = [self.system.expand(m.expression).free_symbols for m in self.system.event_margins[: self.first]]
+        read = [self.system.expand(m.expression).free_symbols for m in self.system.event_margins]
         return {i for i, symbols in enumerate(read) if symbols & found}
 
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import symengine
 
-from surfacechem.compile.program import Function, Program, compile_function
+from surfacechem.compile.program import Function, compile_function
 from surfacechem.expressions import magnitude
 from surfacechem.model.automaton import INTERFACE, REST_TIME_PATH, Edge
 from surfacechem.model.balances import elastic_energy
@@ -129,7 +129,7 @@ class PendingJump:
 class Jumper:
     """The jumps of a system, compiled on the first jump."""
 
-    def __init__(self, system: System, program: Program) -> None:
+    def __init__(self, system: System) -> None:
         self.system = system
         self.states = [state.name for state in system.states]
         self.equilibria = Equilibria(system)

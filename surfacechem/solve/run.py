@@ -474,7 +474,7 @@ class Model:
             external=_external_inputs(system),
             groups=tuple(GROUPS.get(account.kind, -1) for account in system.ledger),
         )
-        self.jumper = Jumper(system, self.program) if system.has_arcs else None
+        self.jumper = Jumper(system) if system.has_arcs else None
         # The program's key has the inputs, and the expressions that are the same in both times.
         own = [each for each, other in zip(formed, local, strict=True) if each is not other]
         key = program.key and key_of(own, program.key, [item.name for item in system.outputs])
@@ -691,7 +691,7 @@ class Model:
         crosses = crosses and not self.system.solves_jumps and self.program.external is None
         told = (yield from carried(problem, self.jumper)) if crosses else None
         if told is None:
-            hybrid = Hybrid(self.system, self.jumper, problem, len(self.margins))
+            hybrid = Hybrid(self.jumper, problem)
             told = (yield from hybrid.run()), hybrid.instant.jumps, hybrid.instant.reason
         result, jumps, reason = told
         word = "failed" if result.status is Status.FAILED else "stopped"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.radau import tables
-from surfacechem.solve.radau.newton import divide, set_stage, stage_count, value_and_slope
+from surfacechem.solve.radau.newton import divide, put_change, set_stage, stage_count, value_and_slope
 from surfacechem.solve.radau.work import LEDGER, combine, compiled, copy, evaluate, finite, put
 from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS, TINY
 
@@ -81,12 +81,7 @@ def scan_step(w: Any) -> None:
 @compiled
 def put_scanned(w: Any, h: float, i: int) -> None:
     """Set the inputs to one of the points where guards are examined."""
-    n, rate = w.n, 1.0 / h
-    inputs, y, change, slope = w.inputs, w.y, w.scanned[i], w.scanned_rates[i]
-    inputs[0] = w.base + (w.tau + tables.SCANNED[w.member, i] * h)
-    for m in range(n):
-        inputs[1 + m] = y[m] + change[m]
-        inputs[1 + n + m] = slope[m] * rate
+    put_change(w, h, tables.SCANNED[w.member, i], w.scanned[i], w.scanned_rates[i], 1.0 / h)
 
 
 @compiled

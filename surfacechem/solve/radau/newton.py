@@ -221,31 +221,28 @@ def predict(w: Any, h: float) -> None:
 
 
 @compiled
-def _put_stage(w: Any, i: int, h: float, rate: float) -> None:
-    """Set the inputs to stage i, from its slope."""
+def put_change(w: Any, h: float, x: float, change: Any, slope: Any, rate: float) -> None:
+    """Set the inputs to the fraction x of a step, from the change of the state up to there, and its slope and rate."""
     n = w.n
     # Local names save the loops a reload from the record after each store.
-    inputs, z, y, slopes = w.inputs, w.z[i], w.y, w.slopes[i]
-    inputs[0] = w.base + (w.tau + tables.NODES[w.member, i] * h)
+    inputs, y = w.inputs, w.y
+    inputs[0] = w.base + (w.tau + x * h)
     for m in range(n):
-        inputs[1 + m] = y[m] + z[m]
-        inputs[1 + n + m] = slopes[m] * rate
+        inputs[1 + m] = y[m] + change[m]
+        inputs[1 + n + m] = slope[m] * rate
 
 
 @compiled
 def set_stage(w: Any, i: int, h: float) -> None:
     """Set the inputs to stage i."""
-    k = w.member
+    k, s = w.member, stage_count(w.member)
     if w.explicit != 0:
-        w.inputs[0] = w.base + (w.tau + tables.NODES[k, i] * h)
-        for m in range(w.n):
-            w.inputs[1 + m] = w.y[m] + w.z[i, m]
-            w.inputs[1 + w.n + m] = w.k[12, m]
-        if i + 1 < stage_count(k):
+        put_change(w, h, tables.NODES[k, i], w.z[i], w.k[12], 1.0)
+        if i + 1 < s:
             put_rates(w, w.trial_dot)
         return
-    combine(tables.INVERSE[k, i].ctypes.data, 7, 1, stage_count(k), w.z.ctypes.data, w.n, w.slopes[i].ctypes.data)
-    _put_stage(w, i, h, 1.0 / h)
+    combine(tables.INVERSE[k, i].ctypes.data, 7, 1, s, w.z.ctypes.data, w.n, w.slopes[i].ctypes.data)
+    put_change(w, h, tables.NODES[k, i], w.z[i], w.slopes[i], 1.0 / h)
 
 
 @compiled
@@ -341,7 +338,7 @@ def solve_stages(w: Any, h: float) -> int:
     for iteration in range(limit):
         combine(tables.INVERSE[k].ctypes.data, 7, s, s, w.z.ctypes.data, w.n, w.slopes.ctypes.data)
         for i in range(s):
-            _put_stage(w, i, h, rate_of_time)
+            put_change(w, h, tables.NODES[k, i], w.z[i], w.slopes[i], rate_of_time)
             evaluate(w, RESIDUAL, w.g[i])
         w.residuals += s
         norm = _correct(w)
