@@ -362,16 +362,15 @@ class Equilibria:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.states = [state.name for state in system.states]
         self.items = system.equilibria
-        self.columns = np.array([self.states.index(e.state) for e in self.items], dtype=np.int64)
+        self.columns = np.array([system.state_columns[e.state] for e in self.items], dtype=np.int64)
         """Columns of the states that are the gaps."""
         columns = system.parameter_columns
         self.slip = columns.get(SLIP_PATH) if any(e.slip for e in self.items) else None
         """Column of the sliding mode among the parameters, if gaps in equilibrium stick or slide."""
-        sided = SIDE_PATH in columns and "g_n" in self.states
-        self._side = 1 + 2 * len(self.states) + columns[SIDE_PATH] if sided else None
-        self.followers = [1 + self.states.index(name) for name in system.followers]
+        sided = SIDE_PATH in columns and "g_n" in system.state_columns
+        self._side = 1 + 2 * len(system.states) + columns[SIDE_PATH] if sided else None
+        self.followers = [1 + system.state_columns[name] for name in system.followers]
         """Columns among the inputs of the states that follow the normal gap where it jumps."""
 
     _balance = formulas(lambda self: (item for e in self.items for item in (e.residual, e.size)))
@@ -384,7 +383,10 @@ class Equilibria:
     @cached_property
     def _moving(self) -> Function:
         """For each gap: zero if it is held, and the change of each state with it."""
-        rows = ([e.active, *(e.coupled.get(name, int(name == e.state)) for name in self.states)] for e in self.items)
+        rows = (
+            [e.active, *(e.coupled.get(name, int(name == e.state)) for name in self.system.state_columns)]
+            for e in self.items
+        )
         return compiled(self.system, (item for row in rows for item in row))
 
     @cached_property
@@ -402,11 +404,11 @@ class Equilibria:
 
     def free(self, point: Point) -> Indices:
         """Return the indices of the gaps that are not held."""
-        return np.nonzero(self._moving(point.inputs())[:: 1 + len(self.states)])[0]
+        return np.nonzero(self._moving(point.inputs())[:: 1 + len(self.system.states)])[0]
 
     def changes(self, point: Point) -> Array:
         """Return the change of each state with each gap by itself, shape (gaps, states)."""
-        return self._moving(point.inputs()).reshape(len(self.items), 1 + len(self.states))[:, 1:]
+        return self._moving(point.inputs()).reshape(len(self.items), 1 + len(self.system.states))[:, 1:]
 
     def together(self, point: Point, weights: Array) -> GapDirection:
         """Return the common direction of several gaps, measured by the gap that moves the most, whose weight is 1."""
@@ -428,7 +430,7 @@ class Equilibria:
         """Update the mode of touch in inputs whose gaps have moved; in a jump the following states too."""
         if self._side is not None:
             # A law that changes at touch is valid on its own side only and may have poles beyond.
-            column, g = self._side, rows[:, 1 + self.states.index("g_n")]
+            column, g = self._side, rows[:, 1 + self.system.state_columns["g_n"]]
             rows[:, column] = np.where(g == 0, rows[:, column], np.sign(g))
         if jumps and self.followers:
             rows[:, self.followers] = self._follow(rows)
@@ -662,16 +664,15 @@ class Folds:
         """For each fold: decrease of the tangent along each gap, warming of states by each gap, stiffness matrix."""
         found = {}
         for index, fold in self.items.items():
-            warming = [rise.get(name, 0) for rise in fold.warming for name in self.equilibria.states]
+            warming = [rise.get(name, 0) for rise in fold.warming for name in self.system.state_columns]
             entries = [entry for row in fold.stiffness for entry in row]
             found[index] = compiled(self.system, [*fold.falls, *warming, *entries])
         return found
 
-    @cached_property
-    def _approach(self) -> Function:
-        """Driving traction of each gap, and its total time derivative."""
-        residuals = [item.residual for item in self.equilibria.items]
-        return compiled(self.system, (x for each in residuals for x in (each, rate_of(self.system, each))))
+    _approach = formulas(
+        lambda self: (x for e in self.equilibria.items for x in (e.residual, rate_of(self.system, e.residual)))
+    )
+    """Driving traction of each gap, and its total time derivative."""
 
     def _shape(self, index: int, point: Point) -> tuple[Array, GapDirection, Array]:
         """Return the decrease of a fold's tangent along each gap, the singular direction, and the change of the states

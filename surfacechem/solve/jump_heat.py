@@ -51,7 +51,6 @@ class JumpHeat:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.states = [state.name for state in system.states]
         self.interface = list(system.sinks).index(INTERFACE)
 
     @cached_property
@@ -62,7 +61,7 @@ class JumpHeat:
     @cached_property
     def free(self) -> list[int]:
         """Columns among the inputs of the temperatures that heat raises."""
-        return [1 + self.states.index(sink.node) for sink in self.nodes.values() if not sink.prescribed]
+        return [1 + self.system.state_columns[sink.node] for sink in self.nodes.values() if not sink.prescribed]
 
     @cached_property
     def node_values(self) -> Function:

@@ -131,7 +131,6 @@ class Jumper:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.states = [state.name for state in system.states]
         self.equilibria = Equilibria(system)
         self.folds = Folds(self.equilibria)
         self._jumps = False
@@ -235,7 +234,7 @@ class Jumper:
             moved.setdefault(e.axis, set()).update((e.state, *e.coupled))
         if "n" in moved:
             moved["n"].update(self.system.followers)
-        return [(axis, [1 + self.states.index(name) for name in names]) for axis, names in moved.items()]
+        return [(axis, [1 + self.system.state_columns[name] for name in names]) for axis, names in moved.items()]
 
     # -- tables for the compiled loop -----------------------------------------------------------------------------
 
@@ -254,7 +253,7 @@ class Jumper:
             node_values = self._heat.node_values if nodes else None
             functions[1:] = self.guard_rates, self._total_functions, node_values, self.times_of_return, *self._resets
         starts = [j for j, p in enumerate(system.parameters) if p.path == START]
-        sizes = 4 + len(given), len(nodes) * (3 + len(system.sinks)), len(self.states) + len(self.mode_columns)
+        sizes = 4 + len(given), len(nodes) * (3 + len(system.sinks)), len(self.system.states) + len(self.mode_columns)
         return EdgeTables(
             sizes=_integers(sizes, 3),
             code=_integers([(f.address, f.user) if f else (0, 0) for f in functions], -1, 2),
@@ -262,7 +261,7 @@ class Jumper:
             when=_integers(system.guard_conditions, -1, 3),
             held=_integers(self.mode_columns, -1),
             clocks=_integers([*starts, *system.origins], -1),
-            nodes=_integers([-1 if node.prescribed else self.states.index(node.node) for node in nodes], -1),
+            nodes=_integers([-1 if node.prescribed else self.system.state_columns[node.node] for node in nodes], -1),
             accounts=_integers(self._accounts, -1, 2),
             least_peaks=velocity_scales(system),
         )
@@ -272,7 +271,7 @@ class Jumper:
         returns = [item for item in self.system.edges if item.return_time is not None]
         source = self._first_source(edge)
         return (
-            self.states.index(edge.measure) if edge.measure else -1,
+            self.system.state_columns[edge.measure] if edge.measure else -1,
             list(self.system.sinks).index(INTERFACE) if source < 0 else source,
             edge.violation == "refuse",
             next((k for k, item in enumerate(returns) if item is edge), -1),
@@ -294,7 +293,7 @@ class Jumper:
         for account in self.system.ledger:
             name = account.quantity.name
             if account.kind == "bonds":
-                found.append((BONDS, self.states.index(account.law)))
+                found.append((BONDS, self.system.state_columns[account.law]))
             elif account.law == "events":
                 found.append((sums.get(account.kind, ENTROPY_OUT), 0))
             else:
@@ -320,7 +319,7 @@ class Jumper:
         width = (rows.shape[1] - columns) // 2
         for row, numbers in zip(rows, rows[:, :columns].tolist(), strict=True):
             index, arc, released, gain, heat, entropy, admissible, *work = numbers
-            point, after = (Point.of(row[k : k + width], len(self.states)) for k in (columns, columns + width))
+            point, after = (Point.of(row[k : k + width], len(self.system.states)) for k in (columns, columns + width))
             began, length = arcs[int(arc) - 1, :2].tolist() if arc else (math.nan, 0.0)
             # The length of the last arc is more accurate than the difference of two times.
             since = length + (point.t - min(began + length, end)) if began == last else point.t - last
@@ -458,7 +457,7 @@ class Jumper:
         edge, slack, slip = pending.edge, pending.slack, self.equilibria.slip
         if not edge.measure or pending.fold is not None:
             return after
-        if abs(after.y[self.states.index(edge.measure)]) > max(slack.noise, slack.drift):
+        if abs(after.y[self.system.state_columns[edge.measure]]) > max(slack.noise, slack.drift):
             return after
         sliding = 0.0 if slip is None else after.parameters[slip]
         return self.equilibria.with_slip(after._replace(parameters=pending.start.parameters), sliding)
@@ -562,7 +561,7 @@ class Jumper:
         """
         perturbed = before.copy()
         if edge.measure:
-            perturbed[1 + self.states.index(edge.measure)] += noise
+            perturbed[1 + self.system.state_columns[edge.measure]] += noise
         now, still, moved = self._totals(np.stack([after, before, perturbed]))
         gain = float(now[1] - totals[1] + entropy_out)
         small = RUN_EPS * max(abs(totals[1]), abs(now[1]), abs(entropy_out))

@@ -62,9 +62,10 @@ class _Stretch(SingleSteps):
         return np.array(answer.y)
 
 
-def _longest(problem: Problem) -> float:
-    """Return the longest step in the libraries' form; 0 if unlimited."""
-    return problem.spacing if np.isfinite(problem.spacing) else 0.0
+def _options(problem: Problem) -> dict[str, Any]:
+    """Return the settings that both libraries take; a longest step of 0 is unlimited."""
+    longest = problem.spacing if np.isfinite(problem.spacing) else 0.0
+    return {"rtol": problem.rtol, "max_num_steps": 100_000, "max_step": longest}
 
 
 class CVODESolver(SteppingSolver):
@@ -81,14 +82,7 @@ class CVODESolver(SteppingSolver):
             out[:] = view.reduced_jacobian(t + since, x)
 
         self.check(len(y[view.differential]))
-        library = CVODE(
-            rates,
-            rtol=view.problem.rtol,
-            atol=view.atol,
-            jacfn=jacobian,
-            max_num_steps=100_000,
-            max_step=_longest(view.problem),
-        )
+        library = CVODE(rates, atol=view.atol, jacfn=jacobian, **_options(view.problem))
         return _Stretch(library, view.problem.max_steps, t, end, y[view.differential])
 
 
@@ -107,15 +101,8 @@ class IDASolver(SteppingSolver):
             by_state, by_rate = view.matrices(t + since, x, rate)
             out[:] = by_state + shift * by_rate
 
-        library = IDA(
-            residual,
-            rtol=view.problem.rtol,
-            atol=view.problem.atol,
-            jacfn=jacobian,
-            max_num_steps=100_000,
-            max_step=_longest(view.problem),
-            algebraic_idx=list(view.algebraic) or None,
-        )
+        indices, options = list(view.algebraic) or None, _options(view.problem)
+        library = IDA(residual, atol=view.problem.atol, jacfn=jacobian, algebraic_idx=indices, **options)
         return _Stretch(library, view.problem.max_steps, t, end, y, ydot)
 
 
