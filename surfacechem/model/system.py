@@ -410,6 +410,11 @@ class System:
         """Temperature profiles of bodies; their states come after all other states, profile by profile."""
         return self.notes_of(Profile)
 
+    @cached_property
+    def moving(self) -> list[str]:
+        """Names of the quantities that change in time whatever the states do."""
+        return [item.name for item in self.named if item.output and depends(item.expression, self.t)]
+
     def unit(self, unit: str) -> str:
         """Return the unit, or that of the corresponding total if the system is a pair of bodies."""
         return TOTAL_UNITS.get(unit, unit) if self.in_totals else unit

@@ -240,8 +240,7 @@ class EmbeddedScene:
     def varies(self) -> bool:
         """True if anything depends explicitly on time."""
         system = self.model.system
-        named = (item.expression for item in system.named)
-        return any(depends(expression, system.t) for expression in (*named, *system.rows.values()))
+        return bool(system.moving) or any(depends(row, system.t) for row in system.rows.values())
 
     @property
     def accounts(self) -> tuple[str, ...]:

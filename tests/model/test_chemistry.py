@@ -1,6 +1,7 @@
 """Bonds under load in a scene: who carries what, when bonds rupture, and survival however small."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from solved import solve
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.laws.free_energy import BondSprings, LatticeGas, NormalStiffness
+from surfacechem.laws.free_energy import BondSprings, LatticeGas, LinearEnthalpy, NormalStiffness
 from surfacechem.laws.kinetics import Bell, ReversibleBell
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.model.assemble import assemble
@@ -78,6 +79,19 @@ def test_survival_of_any_smallness():
     np.testing.assert_allclose(trajectory["phi"][1:5], np.exp(-hazard[:4]), rtol=1e-8)
     assert np.isfinite(trajectory.outputs).all()
     assert audit(trajectory).site_error < 1e-10
+
+
+def test_laws_that_read_a_load_share_what_they_break_however_fast_they_are():
+    """At e^200 per second no time resolves them; each still breaks its half, and not what rounding leaves of bonds."""
+    scene = isothermal(SLIP, {"f": Ramp(rate=UNIT)}, potentials=[LinearEnthalpy(H_r=1.0)])
+    interface = replace(scene.interface, reactions=[SLIP, replace(SLIP, k_off=2.0)])
+    trajectory = solved(replace(scene, interface=interface), 200.0)
+    found = audit(trajectory)
+    assert found.site_error < 1e-8
+    assert found.entropy_error < 1e-8
+    accounts = [account.quantity.name for account in trajectory.model.system.ledger]
+    heats = dict(zip(accounts, trajectory.result.ledger.tolist(), strict=True))
+    assert (heats["heat_bell"], heats["heat_bell_2"]) == pytest.approx((-1 / 3, -2 / 3), rel=1e-9)
 
 
 def test_logarithms_change_nothing_else():

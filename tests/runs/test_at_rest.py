@@ -13,7 +13,7 @@ STEADY = ["run.until=steady"]
 
 
 @pytest.mark.parametrize("solver", ["radau", "cantera"])
-@pytest.mark.parametrize("case", ["dna-adhesive", "exothermic"])
+@pytest.mark.parametrize("case", ["dna-adhesive", "exothermic", "elastic-bonds-at-a-gap"])
 def test_a_run_ends_where_a_run_ten_times_as_long_ends(case, solver):
     simulation = surfacechem.load(case, [*STEADY, f"run.solver={solver}", "run.rtol=1e-9"])
     solution = simulation.run(error="balances")

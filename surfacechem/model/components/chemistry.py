@@ -190,24 +190,31 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
 def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], label: str) -> Expression:
     """Limit a rate whose exponents read a load, in both directions alike, to the fastest relaxation that time resolves.
 
-    It then still relaxes at once, and far faster than all other reactions of the same species, so that the partition of
-    the species between reactions does not depend on the limit.
+    It then still relaxes at once, and far faster than reactions of the same species that read no load, so that the
+    partition of the species between reactions does not depend on the limit. Reactions of one species that read loads
+    are limited together, by one factor.
     """
-    law, rate = laws[label], rates[label]
-    loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
-    if not any(loads & item.free_symbols for item in exponents(rate)):
+    loaded, rate, own = _loaded(build, rates), rates[label], laws[label].stoichiometry()
+    relaxation = _relaxation(build, own, laws[label], rate)
+    if label not in loaded or relaxation == 0:
         return rate
+    others = {name: absolute(_relaxation(build, own, laws[name], rates[name])) for name in laws if name != label}
+    fast = relaxation + sum(others[name] for name in others if name in loaded)
+    slow = sum(others[name] for name in others if name not in loaded)
+    quantity = Quantity(f"steps_{label}", "1", f"relaxations of {laws[label].title} in the least time that is resolved")
+    steps = fast * (build.t * TIME_EPS / RUPTURE_FACTOR) / (1 + slow * (build.t / RUPTURE_FACTOR))
+    named = build.name(quantity, steps, output=False)
+    return rate * where(named > 1, 1 / named, 1)
+
+
+def _loaded(build: Build, rates: Mapping[str, Expression]) -> set[str]:
+    """Return the labels of rates whose exponents read a load, other than one that bonds share: these rupture first,
+    which ends the run.
+    """
     if any(role.by == SHARED_LOAD and build.variables.was_read(role.variable) for role in build.variables.roles):
-        return rate  # bonds that share a load rupture first, which ends the run
-    own = law.stoichiometry()
-    relaxation = _relaxation(build, own, law, rate)
-    if relaxation == 0:
-        return rate
-    others = (absolute(_relaxation(build, own, laws[other], rates[other])) for other in laws if other != label)
-    quantity = Quantity(f"steps_{label}", "1", f"relaxations of {law.title} within what time resolves")
-    steps = build.name(quantity, relaxation * (build.t * TIME_EPS / RUPTURE_FACTOR), output=False)
-    allowed = 1 + sum(others) * (build.t / RUPTURE_FACTOR)
-    return rate * where(steps > allowed, allowed / steps, 1)
+        return set()
+    loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
+    return {label for label, rate in rates.items() if any(loads & item.free_symbols for item in exponents(rate))}
 
 
 def _relaxation(build: Build, names: Iterable[str], law: RateLaw, rate: Expression) -> Expression:
