@@ -44,6 +44,14 @@ this part of the time that has passed.
 RESOLVED = NEWTON_EPS
 """Part of the time that has passed within which roundoff hides whether a margin shrinks."""
 
+UNRESOLVED = Status.STEP_UNDERFLOW, Status.NOT_FINITE, Status.SINGULAR
+"""Ends of runs in which a state may change too fast for time to resolve."""
+
+STEEP = 2.0
+"""Time in which a margin closes, in units of that in which the fastest state changes by itself, up to which it is that
+change: one, and some for the last step, over which the rate is not constant.
+"""
+
 RUNAWAY = 1e12
 """Size of a diverging state, in units of its scale."""
 
@@ -145,9 +153,14 @@ def closest_margin(system: System, program: Program, margins: Sequence[Margin], 
     with np.errstate(invalid="ignore", divide="ignore"):
         shrink = seen[-1] / np.fmax.reduce(np.abs(seen), axis=0)
         left = seen[-1] / (seen[before] - seen[-1]) * (t[-1] - t[before])
+    # A margin with an infinite slope at its end, as of bonds that share a load, is still large where time resolves no
+    # more: it closes ever faster, no state faster.
+    speeds = _speeds(system.states, result)
+    steep = (left * speeds.max() < STEEP) & (result.status in UNRESOLVED) & _is_faster(result, int(speeds.argmax()))
     closing = terminal & (seen[-1] < seen[before]) & ((left < STALLED * t[-1]) | (shrink < CLOSED_GUARD))
+    closing &= (shrink < STALLED) | steep
     nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
-    return margins[nearest] if closing[nearest] and shrink[nearest] < STALLED else None
+    return margins[nearest] if closing[nearest] else None
 
 
 def _values(
@@ -178,7 +191,7 @@ def hidden(states: Sequence[State], result: Result) -> str | None:
 
 def runaway(states: Sequence[State], result: Result) -> str | None:
     """Describe the state that changes too fast for time to resolve, if that is why a run could not go on."""
-    if result.status not in (Status.STEP_UNDERFLOW, Status.NOT_FINITE, Status.SINGULAR):
+    if result.status not in UNRESOLVED:
         return None
     beyond = np.abs(result.y) / np.array([state.scale for state in states])
     if np.max(beyond) > RUNAWAY:
