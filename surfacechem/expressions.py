@@ -7,11 +7,11 @@ SymEngine differentiates exactly and compiles. Every function here keeps its val
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache, reduce
 from typing import Any, TypeAlias
 
-from surfacechem.tolerances import FORMULA_EPS, FRACTION_FLOOR, GUARD_EPS
+from surfacechem.tolerances import EPS, FORMULA_EPS, FRACTION_FLOOR, GUARD_EPS, TINY
 
 Expression: TypeAlias = Any
 """A float or a SymEngine expression."""
@@ -190,11 +190,22 @@ def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = N
             return symengine.Piecewise(*zip(sides, conditions, strict=True))
         if e.is_Add or e.is_Mul:  # the error of each term or factor, with the others exact
             return symengine.Add(*(symengine.Abs(_partial(e, i)) * bound(a) for i, a in enumerate(e.args)))
+        near = _off_zero(e, bound) if e.is_Pow else e
         # |f'(a)| M(a), and |f| for the rounding of f itself
-        errors = (symengine.Abs(_partial(e, i)) * bound(a) for i, a in enumerate(e.args) if a.free_symbols)
-        return symengine.Add(symengine.Abs(e), *errors)
+        errors = (symengine.Abs(_partial(near, i)) * bound(a) for i, a in enumerate(e.args) if a.free_symbols)
+        return symengine.Add(symengine.Abs(near), *errors)
 
     return bound(symengine.sympify(expression))
+
+
+def _off_zero(power: Any, bound: Callable[[Any], Any]) -> Any:
+    """Return a power of a base that is larger by its roundoff, which may hide that it is zero or below, where slopes of
+    broken powers are infinite.
+    """
+    base, exponent = power.args
+    if exponent.is_Integer or not base.free_symbols:
+        return power
+    return (symengine.Abs(base) + EPS * bound(base) + TINY) ** exponent
 
 
 def _engine(x: Expression) -> Any:
@@ -248,8 +259,7 @@ def exp(x: Expression) -> Expression:
         return math.exp(x) if x < EXPONENT_CAP else math.exp(EXPONENT_CAP) * (1 + x - EXPONENT_CAP)
     if x.is_Number:
         return exp(float(x))
-    top = math.exp(EXPONENT_CAP)
-    return where(x < EXPONENT_CAP, symengine.exp(x), top * (x + (1 - EXPONENT_CAP)))
+    return where(x < EXPONENT_CAP, symengine.exp(x), math.exp(EXPONENT_CAP) * (x + (1 - EXPONENT_CAP)))
 
 
 LITERAL = 250.0

@@ -119,7 +119,7 @@ def test_rates_and_guards_of_a_case_are_those_of_its_scalar_code(member):
     # Tractions cancel in a rate, which is no more accurate than its terms.
     formulas = solved_rates(model.system.residual(), [state.dot for state in model.system.states])
     terms = compile_function(model.system.inputs, [magnitude(rate) for rate in formulas], model.system.cell_symbols)
-    allowed = np.fmax(FORMULA_EPS * terms(rows).T, 1e-12 * np.abs(found[: program.n]))
+    allowed = np.maximum(FORMULA_EPS * terms(rows).T, 1e-12 * np.abs(found[: program.n]))
     assert (np.abs(code.states(given) - found[: program.n]) <= allowed).all()
     n, found = program.n, code.slopes(given).T
     assert found[:, : n * n].reshape(slopes.shape) == pytest.approx(slopes, rel=1e-6, abs=1e-9 * np.abs(slopes).max())

@@ -79,8 +79,7 @@ DENSE = np.array(dense_at(NODES[2])).T
 
 def _lagrange(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return 1 / (c_j prod_{k != j} (c_j - c_k)), barycentric weights of the nodes 0, c_1, ..., c_s except 0."""
-    gaps = nodes[:, None] - nodes[None, :] + np.eye(len(nodes))
-    return np.asarray(1.0 / (nodes * gaps.prod(axis=1)))
+    return np.asarray(1.0 / (nodes * (nodes[:, None] - nodes[None, :] + np.eye(len(nodes))).prod(axis=1)))
 
 
 def _defect(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -115,12 +114,6 @@ def _newton(nodes: NDArray[np.float64], coefficients: NDArray[np.float64]) -> ND
         result[i] = remainder[-1] if isinstance(remainder, np.ndarray) else remainder(0.0)
     result[len(nodes) + 1] = np.poly1d(rest)(0.0)
     return result
-
-
-def _probe_shape(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
-    """Return the coefficients of x, x^2, ... in the integral of x prod_i (x - c_i), scaled to one at the probe."""
-    product = np.poly1d(np.append(nodes, 0.0), r=True)
-    return np.asarray((product / product(x)).integ().coeffs[::-1][1:])
 
 
 def _scanned(k: int) -> NDArray[np.float64]:
@@ -170,7 +163,10 @@ PROBE = np.array([_probe(c) for c in _members])
 """Fraction of the step at which the error of an interpolated component is largest."""
 PROBE_RATE = np.array([_probe_rate(c, x) for c, x in zip(_members, PROBE, strict=True)])
 """Coefficients that extrapolate the rates of the stages and of the start (last) to the probe."""
-PROBE_SHAPE = np.array([_newton(c, _probe_shape(c, x)) for c, x in zip(_members, PROBE, strict=True)])
+# Integrals of x prod_i (x - c_i), scaled to one at the probe, by their coefficients of x, x^2, ...
+_products = [np.poly1d(np.append(c, 0.0), r=True) for c in _members]
+_shapes = [(product / product(x)).integ().coeffs[::-1][1:] for product, x in zip(_products, PROBE, strict=True)]
+PROBE_SHAPE = np.array([_newton(c, shape) for c, shape in zip(_members, _shapes, strict=True)])
 """Shape of a quadrature's error, per unit defect of its rate at the probe, in Newton's form."""
 SCANNED = np.array([_scanned(k) for k in range(len(STAGES))])
 """Points of a step at which margins are evaluated."""
