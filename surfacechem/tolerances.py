@@ -51,6 +51,9 @@ CBRT_EPS = EPS ** (1 / 3)
 QUARTER_EPS = EPS**0.25
 """Step of a second difference, 1.2e-4, which divides the roundoff by the square of the step."""
 
+LEAST_WEIGHT = float_info.min
+"""Least tolerance of a state, 2e-308: its inverse times any smaller error is finite."""
+
 NEGLIGIBLE = 1e-3
 """Fraction that changes no decision: step sizes and iterations are known to a few per cent at best."""
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import pkgutil
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -373,4 +374,6 @@ def _sum(expression: Expression, places: Mapping[Any, int]) -> list[tuple[int, f
 def _exact(value: float) -> Any:
     """Return a double as an exact rational number, so that a capacity that vanishes exactly is found to vanish."""
     fraction = Fraction(value)
+    if fraction.denominator > sys.float_info.max:  # of rationals beyond doubles no function has a value
+        return symengine.RealDouble(value)
     return symengine.Integer(fraction.numerator) / symengine.Integer(fraction.denominator)

@@ -124,13 +124,20 @@ def test_bonds_too_strong_for_an_equilibrium_below_the_bound_are_complete(epsilo
     assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
 
 
-@pytest.mark.parametrize(("phi", "rest"), [(0.0, 1.0), (1e-280, 1.0), (1.0, 1.0), (0.5, -483.0), (0.5, 483.0)])
+@pytest.mark.parametrize(
+    ("phi", "rest"), [(0.0, 1.0), (1e-280, 1.0), (1e-290, 1.0), (1.0, 1.0), (0.5, -483.0), (0.5, 483.0)]
+)
 def test_relaxation_to_ideal_mixing_is_that_of_its_logarithm(phi, rest):
     """From any number of bonds to any other; none at all, or all of them, are at rest, which is said."""
     mixing = LatticeGas(epsilon=rest * 1.380649e-23 * 300.0)
     run = closed(isothermal(Relaxation(tau=1.0), phi=phi, potentials=[mixing]), 6.5)
     assert run.end("phi") == pytest.approx(expit(rest + (logit(phi) - rest) * math.exp(-6.5)), rel=1e-9, abs=1e-16)
     assert (phi in (0, 1)) == any("does not leave a bound" in text for text in Solution(run.trajectory).warnings)
+
+
+def test_relaxation_starts_from_less_than_rational_numbers_hold():
+    run = closed(isothermal(Relaxation(tau=1.0), phi=1e-299, potentials=[LatticeGas(epsilon=0.0)]), 1e-3)
+    assert run.end("phi") == pytest.approx(expit(logit(1e-299) * math.exp(-1e-3)), rel=1e-3)
 
 
 def test_a_bound_that_only_a_branch_of_the_rate_passes():

@@ -63,7 +63,7 @@ from surfacechem.solve.radau.work import (
     row_of,
     set_inputs,
 )
-from surfacechem.tolerances import EPS, NEGLIGIBLE, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY, ULPS
+from surfacechem.tolerances import EPS, LEAST_WEIGHT, NEGLIGIBLE, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY, ULPS
 
 # The first two as in RADAU5 (Hairer & Wanner II, IV.8).
 SAFETY = 0.9
@@ -82,7 +82,7 @@ def set_weights(w: Any) -> None:
     rounding = 0.0
     for j in range(w.n):
         size = abs(w.y[j])
-        weight = max(w.atol[j] + w.rtol * size, TINY)
+        weight = max(w.atol[j] + w.rtol * size, LEAST_WEIGHT)
         w.weight[j] = weight
         w.scale[j] = max(size, weight)
         rounding = max(rounding, EPS * size / weight)
@@ -129,7 +129,7 @@ def error_norm(w: Any, floor: float) -> float:
     last = stage_count(w.member) - 1
     for j in range(w.n):
         size = max(abs(w.y[j]), abs(w.y[j] + w.z[last, j]))
-        weight = max(w.atol[j] + w.rtol * size, TINY)
+        weight = max(w.atol[j] + w.rtol * size, LEAST_WEIGHT)
         norm = max(norm, (abs(w.error[j]) - floor * w.noise[j]) / weight)
     return norm / w.loose
 
