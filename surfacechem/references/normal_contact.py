@@ -405,6 +405,5 @@ class OverdampedPullOff(CohesiveZoneOnSpring):
         near = np.where(np.abs(y) < 0.5, y, 0.0)
         coefficients = [0.0, 0.0, *((-1) ** n * (n - 1 - x) / math.factorial(n) for n in range(2, 20))]
         series = np.polynomial.polynomial.polyval(near, coefficients)
-        far = -(1.0 + x) * np.expm1(-y) - x * y - y * np.exp(-y)
-        shape = np.where(np.abs(y) < 0.5, series, far)
+        shape = np.where(np.abs(y) < 0.5, series, -(1.0 + x) * np.expm1(-y) - x * y - y * np.exp(-y))
         return np.asarray(self.k * self.delta_w + self.t_max * math.exp(-x) * shape)

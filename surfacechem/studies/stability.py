@@ -161,8 +161,7 @@ def stability(
     rows = []
     for number, regime in enumerate(found):
         values = thinned(regime.values) if quick else list(regime.values)
-        done = {"done": number, "total": len(found)}
-        log.info("%s: %d values", regime.name, len(values), extra=done)
+        log.info("%s: %d values", regime.name, len(values), extra={"done": number, "total": len(found)})
         runs = {value: prepared(regime.problem(value), rtol) for value in values}
         rows.append(MatrixRow(regime, values, filled(solvers, runs)))
     corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []

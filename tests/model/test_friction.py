@@ -56,8 +56,7 @@ def traction(phi, u):
 
 
 def by_prescribed_gap(t, y):
-    phi = y[0]
-    return [lost(phi, RATE * t)]
+    return [lost(y[0], RATE * t)]
 
 
 def by_spring(t, y):

@@ -43,8 +43,7 @@ PERFECT = {
 
 def run(**parts):
     case = load_text(CASE.format(**PERFECT | parts), "softening.yaml")
-    solution = Simulation(case).run(error="balances")
-    data = solution.dataset
+    data = Simulation(case).run(error="balances").dataset
     assert data.attrs["status"] == "finished", data.attrs["reason"]
     assert data.attrs["energy_error"] < 1e-9
     assert data.attrs["entropy_error"] < 1e-9
