@@ -105,12 +105,12 @@ def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float
     def has_none(argument: Expression) -> bool:
         try:
             both = [x.subs(numbers) for x in (argument, magnitude(argument))]
-        except RuntimeError:  # a condition on an undefined number
+            if any(x.free_symbols for x in both):
+                return False
+            # Within one rounding it is zero; at BOUND_EPS next to a bound it is larger.
+            return any(x.atoms(*NOT_NUMBERS) for x in both) or abs(float(both[0])) <= 0.5 * EPS * float(both[1])
+        except RuntimeError:  # a condition on an undefined number, or no number
             return True
-        if any(x.free_symbols for x in both):
-            return False
-        # Within one rounding it is zero; at BOUND_EPS next to a bound it is larger.
-        return any(x.atoms(*NOT_NUMBERS) for x in both) or abs(float(both[0])) <= 0.5 * EPS * float(both[1])
 
     arguments = (logarithm.args[0].subs({PHI: phi}) for logarithm in whole.atoms(symengine.log))
     return bool(whole.subs({PHI: phi}).atoms(*NOT_NUMBERS)) or any(map(has_none, arguments))
