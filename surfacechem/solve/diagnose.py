@@ -156,7 +156,7 @@ def closest_margin(system: System, program: Program, margins: Sequence[Margin], 
     # A margin with an infinite slope at its end, as of bonds that share a load, is still large where time resolves no
     # more: it closes ever faster, no state faster.
     speeds = _speeds(system.states, result)
-    steep = (left * speeds.max() < STEEP) & (result.status in UNRESOLVED) & _is_faster(result, int(speeds.argmax()))
+    steep = result.status in UNRESOLVED and (left * speeds.max() < STEEP) & _is_faster(result, int(speeds.argmax()))
     closing = terminal & (seen[-1] < seen[before]) & ((left < STALLED * t[-1]) | (shrink < CLOSED_GUARD))
     closing &= (shrink < STALLED) | steep
     nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
