@@ -133,15 +133,16 @@ def _slopes(whole: Any, known: dict[Any, dict[Any, Expression]]) -> dict[Any, li
     return found
 
 
-def _partial(whole: Any, k: int) -> Expression:
-    """Differentiate a sum, product, power or function by its argument number k."""
-    arguments = whole.args
+def _partial(whole: Any, k: int, at: Sequence[Any] = ()) -> Expression:
+    """Differentiate a sum, product, power or function by its argument number k, at its own arguments or at others."""
+    arguments = at or whole.args
     if whole.is_Add:
         return 1
     if whole.is_Mul:
         return symengine.Mul(*arguments[:k], *arguments[k + 1 :])
-    dummies = [symengine.Symbol(f"argument {j}") if j == k else arguments[j] for j in range(len(arguments))]
-    return symengine.diff(whole.func(*dummies), dummies[k]).xreplace({dummies[k]: arguments[k]})
+    dummies = [symengine.Symbol(f"argument {j}") if j == k or at else a for j, a in enumerate(arguments)]
+    values = dict(zip(dummies, arguments, strict=True)) if at else {dummies[k]: arguments[k]}
+    return symengine.diff(whole.func(*dummies), dummies[k]).xreplace(values)
 
 
 def certain(expression: Expression) -> Expression:
@@ -190,22 +191,22 @@ def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = N
             return symengine.Piecewise(*zip(sides, conditions, strict=True))
         if e.is_Add or e.is_Mul:  # the error of each term or factor, with the others exact
             return symengine.Add(*(symengine.Abs(_partial(e, i)) * bound(a) for i, a in enumerate(e.args)))
-        near = _off_zero(e, bound) if e.is_Pow else e
+        near = _off_zero(e, bound)
         # |f'(a)| M(a), and |f| for the rounding of f itself
-        errors = (symengine.Abs(_partial(near, i)) * bound(a) for i, a in enumerate(e.args) if a.free_symbols)
-        return symengine.Add(symengine.Abs(near), *errors)
+        errors = (symengine.Abs(_partial(e, i, near)) * bound(a) for i, a in enumerate(e.args) if a.free_symbols)
+        return symengine.Add(symengine.Abs(e.func(*near) if near else e), *errors)
 
     return bound(symengine.sympify(expression))
 
 
-def _off_zero(power: Any, bound: Callable[[Any], Any]) -> Any:
-    """Return a power of a base that is larger by its roundoff, which may hide that it is zero or below, where slopes of
-    broken powers are infinite.
+def _off_zero(power: Any, bound: Callable[[Any], Any]) -> tuple[Any, ...]:
+    """Return the arguments of a broken power at a base larger by its roundoff, which may hide that it is zero or below,
+    where slopes are infinite; none of other expressions.
     """
+    if not power.is_Pow or power.args[1].is_Integer or not power.args[0].free_symbols:
+        return ()
     base, exponent = power.args
-    if exponent.is_Integer or not base.free_symbols:
-        return power
-    return (symengine.Abs(base) + EPS * bound(base) + TINY) ** exponent
+    return symengine.Abs(base) + EPS * bound(base) + TINY, exponent
 
 
 def _engine(x: Expression) -> Any:

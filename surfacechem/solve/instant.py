@@ -56,8 +56,7 @@ class Rebounds:
     def segments(self, start: float, end: float) -> Array:
         """Return the segments of an arc in its own time, with a separate one for a return that a step might miss."""
         soon = RETURN_FACTOR * self._flight_time(start)
-        inside = [soon] if 0 < soon < FITTED_PART * (end - start) else []
-        return np.array([0.0, *inside, end - start])
+        return np.array([0.0, *([soon] if 0 < soon < FITTED_PART * (end - start) else []), end - start])
 
     def margin_peaks(self, start: float, sizes: Array) -> Array:
         """Return the sizes of the margins to which their roundoff is proportional."""
