@@ -173,8 +173,8 @@ def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States
     """
     result, y, rates = trajectory.result, trajectory.result.outputs, trajectory.rates
     t, segment, problem = result.times, result.segments_at(result.times, result.segment), result.problem
-    lengths = np.diff(t)
-    left = np.flatnonzero((lengths > 0) & (np.diff(segment) == 0) & (t[:-1] > 0))
+    lengths, room = np.diff(t), np.diff(t) / np.spacing(t[1:])  # only so many times lie between two outputs
+    left = np.flatnonzero((room >= 2) & (np.diff(segment) == 0) & (t[:-1] > 0))
     right, length = left + 1, lengths[left]
     middle = t[left] + length / 2
     # The middle of the cubic Hermite interpolant.
@@ -192,7 +192,8 @@ def _refinements(trajectory: Trajectory, resolution: _Resolution) -> list[States
         return []
     rows = np.sort(np.argsort(-missed, kind="stable")[:MOST_REFINED])
     rows = rows[missed[rows] > 1]
-    bent, parts = left[rows], np.minimum(np.ceil(missed[rows]), PARTS_REFINED).astype(int)
+    bent = left[rows]
+    parts = np.minimum(np.minimum(np.ceil(missed[rows]), PARTS_REFINED), room[bent]).astype(int)
     # No event lies between two outputs.
     arc = replace(problem, record_steps=False, line_error=0.0, max_seconds=None, active=(False,) * len(problem.margins))
     problems = [

@@ -112,3 +112,31 @@ def test_what_bends_where_no_state_does_is_shown():
 
 def test_the_potential_of_hardly_any_sites_which_is_their_error_needs_no_outputs():
     assert len(solved("press-hold-pull").dataset.time) < 300
+
+
+RUBBED_ZONE = """
+T_0: 300 K
+bodies: {lower: {temperature: T_1, C: 10 J/m^2/K}, upper: {temperature: T_2, C: 10 J/m^2/K}}
+interface:
+  temperature: T_c
+  potential:
+    - exponential-cohesive-zone: {t_max: 3 MPa, g_0: 5 nm, E_n: 2e15 Pa/m}
+    - constant-interface-capacity: {C_c: 0.5 J/m^2/K}
+  friction:
+    - coulomb: {mu: 0.3}
+heat:
+  - conductance: {between: [lower, interface], h: 5 kW/m^2/K}
+  - conductance: {between: [upper, interface], h: 5 kW/m^2/K}
+mechanics: {normal: {k: 1e14 Pa/m}, tangential: {k: 0.8e14 Pa/m}}
+loading:
+  w_n: {table: {times: [0 s, 1 s, 3 s], values: [-6 nm, -6 nm, 80 nm]}}
+  w_t: {ramp: {rate: 30 nm/s}}
+initial: {T_1: 300 K, T_2: 300 K, T_c: 300 K}
+run: {until: 3 s}
+"""
+
+
+def test_no_two_outputs_have_one_time():
+    """Just before a snap steps come so close to each other that hardly a time lies between them."""
+    times = surfacechem.run(RUBBED_ZONE).dataset["time"].values
+    assert np.all(np.diff(times) > 0)
