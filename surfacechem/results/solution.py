@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -33,6 +33,20 @@ RECORDED_SETTINGS: tuple[str, ...] = ("times", "picture", "atol", "max_steps")
 
 ASKED_SETTINGS = ("solver", "accuracy", "rtol")
 """Those from which solver and tolerances of a run follow that are chosen for an accuracy."""
+
+
+def run_warnings(
+    trajectory: Trajectory, audit: Audit, verdicts: Sequence[BalanceVerdict], accuracy: Accuracy | None = None
+) -> list[str]:
+    """Return warnings for readers of the results of a run, in words."""
+    return [
+        *audit.findings,
+        *(str(verdict) for verdict in verdicts if not verdict.consistent),
+        *event_findings(trajectory.jumps, trajectory.model.system.unit("J/(m^2 K)")),
+        *event_waits(trajectory),
+        *findings(trajectory, accuracy),
+        *trajectory.model.system.warnings,
+    ]
 
 
 class Judgement(NamedTuple):
@@ -115,16 +129,7 @@ class Solution(Results):
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """Warnings for readers of the results, in words."""
-        trajectory = self.trajectory
-        return (
-            *self.audit.findings,
-            *(str(verdict) for verdict in self.verdicts if not verdict.consistent),
-            *event_findings(trajectory.jumps, trajectory.model.system.unit("J/(m^2 K)")),
-            *event_waits(trajectory),
-            *findings(trajectory, self.accuracy),
-            *trajectory.model.system.warnings,
-            *self.notes,
-        )
+        return (*run_warnings(self.trajectory, self.audit, self.verdicts, self.accuracy), *self.notes)
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:

@@ -170,6 +170,7 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
         ("time", f"{speed}; {solution.steps} steps"),
         ("events", _sweep_events(solution)),
         ("balances", f"energy {energy}, entropy {entropy}, sites {sites}; {verdict}"),
+        *(("warning", warning) for warning in solution.warnings),
         ("written", str(written or "")),
     ]
     return Sheet(solution.title or "untitled", facts, {"Runs": _run_rows(solution)} if details else {})

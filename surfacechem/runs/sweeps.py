@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -23,13 +24,14 @@ from surfacechem.model.system import System
 from surfacechem.quantities import VARIABLES
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import CELLS_UNKNOWN, ENDED_AT_START, CellErrors, second_tolerance
-from surfacechem.results.audit import Audit, audit
+from surfacechem.results.audit import Audit, audit, verdicts
 from surfacechem.results.dataset import DATASET_NAMES, Results, coverage_columns, quantities, quantity_columns
 from surfacechem.results.error_estimates import against_exact, estimated, second_run, second_settings, with_cells
 from surfacechem.results.event_table import entropy_destroyed, event_columns, event_times
 from surfacechem.results.matching import exact_values, match
 from surfacechem.results.netcdf import COORDINATES, Column, versions
 from surfacechem.results.refinement import shared_times
+from surfacechem.results.solution import run_warnings
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import (
     END_COLUMNS,
@@ -51,6 +53,9 @@ RESERVED_COLUMNS = ("time", RUN_DIMENSION, "species", "coverage", "error", "entr
 
 COLUMN_PREFIXES = ("event", "checked", "hardest")
 """Prefixes of the names of dimensions and columns of events and of checked runs."""
+
+NUMBERS = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?")
+"""What differs between the same warning of two runs."""
 
 MOST_FOLLOWED = 64
 """Largest number of runs from which the output times of a sweep are chosen; of more, an evenly spread subset."""
@@ -392,6 +397,16 @@ class SweepSolution(Results):
         """Entries of END_COLUMNS for each run."""
         return [end_of(run) | balances_of(run, balances) for run, balances in zip(self.runs, self.audits, strict=True)]
 
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings for readers of the results, each in the words of the first run that it is about."""
+        found: dict[str, list[str]] = {}
+        for run, balances in zip(self.runs, self.audits, strict=True):
+            for text in run_warnings(run, balances, verdicts(run, balances)):
+                found.setdefault(NUMBERS.sub("", text), []).append(text)
+        every = len(self.runs)
+        return tuple(f"{len(texts)} of {counted(every, 'run')}: {texts[0]}" for texts in found.values())
+
     def worst(self, balance: str) -> float:
         """Return the largest error over all runs of the balance of energy, entropy or site."""
         return float(np.max([getattr(balances, f"{balance}_error") for balances in self.audits]))
@@ -533,6 +548,7 @@ class SweepSolution(Results):
             "regime": self.system.regime,
             "solver": self.run.solver,
             "rtol": float(self.run.rtol),
+            "warnings": "; ".join(self.warnings) or "none",
             "runs": len(self.runs),
             "count_steps": self.steps,
             "run_seconds": float(self.seconds),

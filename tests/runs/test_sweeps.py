@@ -35,6 +35,15 @@ def bonding():
     return surfacechem.load("exothermic")
 
 
+def test_what_readers_of_a_run_have_to_know_is_told_of_a_sweep():
+    """Where the friction in sliding is above that at rest, which one of two runs has."""
+    swept = surfacechem.sweep("stick-slip", {"interface.friction.coulomb.mu": [0.4, 0.7]})
+    alone = surfacechem.load("stick-slip").run({"interface.friction.coulomb.mu": 0.7})
+    (warning,) = swept.warnings
+    assert warning == f"1 of 2 runs: {alone.warnings[0]}" == swept.dataset.attrs["warnings"]
+    assert warning in str(sweep_summary(swept, None))
+
+
 def test_six_decades_of_loading_rates_meet_the_exact_formulas(spectrum):
     data = spectrum.dataset
     assert data.sizes == {"rate": 61, "f": 201, "event": 3}
