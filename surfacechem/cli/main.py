@@ -395,6 +395,8 @@ def evaluate(
         found.write(target)
     if not quiet:
         show(points_summary(found, target))
+    for warning in found.warnings if quiet else ():
+        typer.echo(f"surfacechem: warning: {warning}", err=True)
     if reason := next(filter(None, found.refused), ""):
         leave_with("stopped", reason if quiet else "")
 

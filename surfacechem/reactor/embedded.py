@@ -150,11 +150,10 @@ class EndError(Exception):
 
 
 def _refuse_folds(system: System) -> None:
-    folds = [item.reason for item in system.edges if item.fold is not None]
-    if folds:
+    if any(item.fold is not None for item in system.edges):
         raise InputError(
-            f"the scene loses a quasi-static equilibrium ({folds[0]}), at which the gap is infinitely fast, so that an "
-            "integrator without our search cannot come near. Give the gap a damper or a mass, or run the case alone."
+            "the gap may lose its quasi-static equilibrium, in a mechanical fold. There it is infinitely fast, so that "
+            "an integrator without our search cannot come near. Give the gap a damper or a mass, or run the case alone."
         )
 
 

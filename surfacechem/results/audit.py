@@ -463,7 +463,7 @@ def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
         if steps is not None:
             rows = np.concatenate([rows, model.inputs(result, steps.t, steps.y, steps.ydot, steps.segment)])
     return [
-        *_extrapolations(trajectory),
+        *extrapolations(system, trajectory.ranges),
         *_capped_rates(system, rows),
         *active_cautions(system, rows),
         *_lost_fluxes(trajectory),
@@ -517,11 +517,11 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
     return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
 
 
-def _extrapolations(trajectory: Trajectory) -> list[str]:
-    """Return warnings about laws that the run has used outside their range."""
+def extrapolations(system: System, ranges: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Return warnings about laws that are used outside their range, from the least and largest values by name."""
     found = []
-    for limit in trajectory.model.system.notes_of(Range):
-        low, high = trajectory.ranges.get(limit.variable, (math.inf, -math.inf))
+    for limit in system.notes_of(Range):
+        low, high = ranges.get(limit.variable, (math.inf, -math.inf))
         rounding = RUN_EPS * max(abs(low), abs(high))
         if low < limit.low - rounding or high > limit.high + rounding:
             span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"

@@ -30,6 +30,7 @@ from surfacechem.model.assemble import assemble
 from surfacechem.model.automaton import Equilibrium
 from surfacechem.model.system import Named, System
 from surfacechem.quantities import Quantity
+from surfacechem.results.audit import extrapolations
 from surfacechem.results.dataset import DATASET_NAMES, Results
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.scene import Scene
@@ -60,6 +61,8 @@ class PointResults(Results):
     """Derivatives of the quantities that follow by the given ones."""
     refused: Sequence[str]
     """Reason why a law is not valid at a point, by point; empty where all are."""
+    warnings: Sequence[str] = ()
+    """Warnings about laws that are used outside their range."""
 
     def __repr__(self) -> str:
         """Return the number of points in a line."""
@@ -80,7 +83,8 @@ class PointResults(Results):
     @property
     def attributes(self) -> Mapping[str, str | float | int]:
         """Attributes of the dataset, with its origin."""
-        return {**self._origin("evaluated", f"at {len(self.refused)} points"), "versions": versions()}
+        told = {"warnings": "; ".join(self.warnings) or "none", "versions": versions()}
+        return {**self._origin("evaluated", f"at {len(self.refused)} points"), **told}
 
 
 def with_histories_held(scene: Scene) -> Scene:
@@ -454,4 +458,6 @@ def evaluation(evaluator: Evaluator, points: Points, **origin: Any) -> PointResu
     except (TypeError, ValueError):
         raise InputError("points are values by name, such as {'T': [300, 310]}, or a table of pandas.") from None
     values, slopes, refused = evaluator.at(points)
-    return PointResults(values=values, slopes=slopes, refused=refused, **origin)
+    ranges = {column.name: (np.nanmin(column.values), np.nanmax(column.values)) for column in values}
+    warnings = extrapolations(evaluator.system, ranges)
+    return PointResults(values=values, slopes=slopes, refused=refused, warnings=warnings, **origin)

@@ -222,7 +222,10 @@ def points_summary(found: PointResults, written: Path | None) -> Sheet:
         fact = "zero", f"{zero} derivatives, which are not listed" if zero else ""
     more = f", and {len(refused) - 1} more" if len(refused) > 1 else ""
     why = f"point {refused[0][0]}: {refused[0][1]}{more}" if refused else ""
-    return Sheet(found.title or "untitled", [fact, ("refused", why), ("written", str(written or ""))], {"": rows})
+    told = [("warning", warning) for warning in found.warnings]
+    return Sheet(
+        found.title or "untitled", [fact, ("refused", why), *told, ("written", str(written or ""))], {"": rows}
+    )
 
 
 def _sweep_events(solution: SweepSolution) -> str:

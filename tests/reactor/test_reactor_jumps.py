@@ -195,7 +195,7 @@ def test_what_a_jump_refuses_ends_the_scene():
 
 
 def test_quasi_static_folds_are_refused():
-    with pytest.raises(InputError, match=r"loses a quasi-static equilibrium .* Give the gap a damper or a mass"):
+    with pytest.raises(InputError, match=r"may lose its quasi-static equilibrium.* Give the gap a damper or a mass"):
         InterfaceReactor("snap-in")
 
 

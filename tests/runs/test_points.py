@@ -256,3 +256,10 @@ def test_what_is_prescribed_runs_along_histories_that_change(tmp_path):
     assert found.accuracy.error < 1e-9
     with pytest.raises(InputError, match=r"moved.yaml:1: bodies: nothing evolves whose error could be compared"):
         precision(path)
+
+
+def test_what_is_beyond_the_range_of_a_law_is_told():
+    case = surfacechem.load("press-conductance")
+    within, beyond = (case.evaluate({"p": p}).attrs["warnings"] for p in (1e5, 1e9))
+    assert within == "none"
+    assert beyond.endswith("is an extrapolation: p ran from 1e+09 to 1e+09, its range is 1200 to 2.76e+07")

@@ -272,10 +272,7 @@ def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, 
         else:
             static = build.variables.call(bound, bound.limit, given)
         if static != kinetic:
-            text = (
-                f"the static friction of {law.title} is below its sliding friction; what resists sliding from rest on "
-                "is what sticking bears"
-            )
+            text = f"the static friction of {law.title} is below its sliding friction: sticking bears the latter"
             build.add(Caution(static - kinetic, text))
     for d in sticking:
         limits, at_rest, two = build.motion.stick_limits, {**own, **REST}, d is ACROSS and bound.transverse is not None
