@@ -245,33 +245,13 @@ def test_a_run_whose_values_are_not_admissible_is_refused_and_leaves_the_others_
     assert data["T_last"].values[2, 1] == pytest.approx(alone, rel=1e-10)
 
 
-RUPTURE_OF_HEAT = """
-T_0: 300 K
-bodies:
-  lower: {temperature: 300 K}
-  upper: {temperature: 300 K}
-interface:
-  temperature: T_c
-  sites: 100 1/um^2
-  potential:
-    - constant-interface-capacity: {C_c: 1 mJ/m^2/K}
-    - bond-energy: {K_0: 20 J/m^2}
-  bonding:
-    - bell: {k_off: 1 1/s, x_off: 0.4 nm}
-heat:
-  - conductance: {between: [lower, interface], h: 1 W/m^2/K}
-loading: {t_n: {ramp: {rate: 200 Pa/s}}}
-initial: {T_c: 300 K, phi: 0.9}
-run: {until: 100 s}
-"""
-
-
 def test_what_diverges_is_told(tmp_path):
-    simulation = surfacechem.load(
-        RUPTURE_OF_HEAT, {"sweep": {"over": {"initial.phi": [0.8, 0.9]}, "keep": {"last": ["phi"]}}}
-    )
+    """Friction that grows with the fourth power of the temperature."""
+    hotter = [{"coulomb": {"mu": {"value": 0.3, "times": [{"power": {"exponent": 4}}]}}}]
+    over = {"over": {"loading.p": ["100 kPa", "200 kPa"]}, "keep": {"last": ["T"]}}
+    simulation = surfacechem.load("sliding-dry", {"interface.friction": hotter, "sweep": over})
     data = stored(tmp_path / "o.zarr", simulation).dataset
-    assert {data.attrs["reasons"][code] for code in data["reason"].values} == {"T_c runs away"}
+    assert {data.attrs["reasons"][code] for code in data["reason"].values} == {"T runs away"}
 
 
 def test_threads_pieces_and_parts_change_no_byte(whole, tmp_path, monkeypatch):

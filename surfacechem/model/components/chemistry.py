@@ -190,8 +190,8 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
 def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], label: str) -> Expression:
     """Limit a rate whose exponents read a load, in both directions alike, to the fastest relaxation that time resolves.
 
-    It then still relaxes at once, and far faster than reactions of the same species that read no load, so that the
-    partition of the species between reactions does not depend on the limit. Reactions of one species that read loads
+    It then still relaxes at once, and far faster than all other reactions of the same species, so that the partition of
+    the species between reactions does not depend on the limit. Reactions that read loads and change the same species
     are limited together, by one factor.
     """
     loaded, rate, own = _loaded(build, rates), rates[label], laws[label].stoichiometry()
@@ -199,8 +199,9 @@ def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Exp
     if label not in loaded or relaxation == 0:
         return rate
     others = {name: absolute(_relaxation(build, own, laws[name], rates[name])) for name in laws if name != label}
-    fast = relaxation + sum(others[name] for name in others if name in loaded)
-    slow = sum(others[name] for name in others if name not in loaded)
+    alike = {name for name in others if name in loaded and laws[name].stoichiometry().keys() == own.keys()}
+    fast = relaxation + sum(others[name] for name in alike)
+    slow = sum(others[name] for name in others if name not in alike)
     quantity = Quantity(f"steps_{label}", "1", f"relaxations of {laws[label].title} in the least time that is resolved")
     steps = fast * (build.t * TIME_EPS / RUPTURE_FACTOR) / (1 + slow * (build.t / RUPTURE_FACTOR))
     named = build.name(quantity, steps, output=False)
