@@ -99,6 +99,8 @@ class Number(Content):
         """Return the value in SI, or the word."""
         if self.word and tree.value == self.word:
             return self.word
+        if self.word and isinstance(tree.value, str) and tree.value.isalpha():
+            raise tree.error(f"{name} is a number with a unit or `{self.word}`, not {tree.shown}.")
         if self.wanted and isinstance(tree.value, dict):
             raise tree.error(f"{self.wanted}, not {tree.shown}.")
         spec = self.spec.resolved(context.x)

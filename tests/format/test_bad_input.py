@@ -101,6 +101,7 @@ MISTAKES = [
     ("reference: bonding", "reference: bonding\nsweep: {}", "21: sweep: a sweep needs `over` or `sample`: values of p"),
     ("reference: bonding", "reference: bonding\nsweep: {over: {}}", "example `over: {loading.f.ramp.rate: {from: 1 pN"),
     ("{until: 5 s}", "{until: {f: 1 pN}}", "19: run.until: where a load is reached, runs of a sweep end by `sweep.unt"),
+    ("{until: 5 s}", "{until: stedy}", "19: run.until: until is a number with a unit or `steady`, not 'stedy'."),
     ("{until: 5 s}", "{outputs: 5}", "19: run: the run needs an end. Add `until: 1 s`, or a list of `times`."),
     ("{until: 5 s}", "{until: 5 s, outputs: [1 s]}", "19: run.outputs: outputs are a number, `outputs: 201`; a list"),
     ("{until: 5 s}", "{until: 5 s, outputs: 2.5}", "19: run.outputs: outputs must be a whole number, got 2.5."),
