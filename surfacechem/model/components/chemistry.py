@@ -127,7 +127,8 @@ def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
     """Return the reactions with their net rates as named quantities."""
     laws = {item.label: item.law for item in found if item.law.envelope is None}
     stated = {item.label: _rate(build, item.law, item.affinity) for item in found if item.label in laws}
-    rates = {label: _resolved(build, laws, stated, label) for label in stated}
+    loaded = _loaded(build, stated)
+    rates = stated | {label: _resolved(build, laws, stated, label, loaded) for label in stated if label in loaded}
     forming = symengine.Add(*(law.stoichiometry().get("phi", 0) * rates[label] for label, law in laws.items()))
     # One while the bonding state may change; zero at a bound and while debonded. Laws without an envelope could carry
     # it over a bound; a law with an envelope ends there.
@@ -187,16 +188,18 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     return rate
 
 
-def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], label: str) -> Expression:
+def _resolved(
+    build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], label: str, loaded: set[str]
+) -> Expression:
     """Limit a rate whose exponents read a load, in both directions alike, to the fastest relaxation that time resolves.
 
     It then still relaxes at once, and far faster than all other reactions of the same species, so that the partition of
     the species between reactions does not depend on the limit. Reactions that read loads and change the same species
     are limited together, by one factor.
     """
-    loaded, rate, own = _loaded(build, rates), rates[label], laws[label].stoichiometry()
+    rate, own = rates[label], laws[label].stoichiometry()
     relaxation = _relaxation(build, own, laws[label], rate)
-    if label not in loaded or relaxation == 0:
+    if relaxation == 0:
         return rate
     others = {name: absolute(_relaxation(build, own, laws[name], rates[name])) for name in laws if name != label}
     alike = {name for name in others if name in loaded and laws[name].stoichiometry().keys() == own.keys()}
