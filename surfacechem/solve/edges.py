@@ -183,8 +183,14 @@ def _add_to_ledger(w: Any, released: float, gain: float, heat: float, entropy: f
             w.booked[m] += w.after[1 + place] - w.moment[1 + place]
         elif kind == stepper.WORK:
             w.booked[m] += w.totals_after[place] - w.totals_before[place]
-        elif kind != stepper.NOT_BOOKED:  # in the order of the kinds
-            w.booked[m] += (released, gain, -heat, -entropy)[kind - stepper.RELEASED]
+        elif kind == stepper.RELEASED:
+            w.booked[m] += released
+        elif kind == stepper.PRODUCED:
+            w.booked[m] += gain
+        elif kind == stepper.HEAT_OUT:
+            w.booked[m] -= heat
+        elif kind == stepper.ENTROPY_OUT:
+            w.booked[m] -= entropy
 
 
 @compiled
