@@ -588,7 +588,8 @@ class Equations:
         from surfacechem.compile.alike import loops_of
 
         core, inputs, named = self.core, self.inputs, needed(self.named, self.residual)
-        loops, rest = loops_of(inputs, [symengine.Integer(0)] * core + whole[core:], own)
+        others = [symengine.Integer(0)] * core
+        loops, rest = loops_of(inputs, others + whole[core:], own)
         wanted, nonzeros = self._nonzeros(named)
         places = {(i, 1 + j): place for place, (i, j) in enumerate(wanted)}
         known = {symbol: place for place, symbol in enumerate(inputs)}

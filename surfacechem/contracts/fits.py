@@ -96,7 +96,8 @@ def _polynomial(function: Callable[[Array], Array], low: float, high: float, tar
     """Return the polynomial through the Chebyshev nodes; None if its error elsewhere exceeds the target."""
     nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     values = function((low + high) / 2 + (high - low) / 2 * nodes)
-    piece = Piece(low, high, _padded(chebyshev.cheb2poly(chebyshev.chebfit(nodes, values, DEGREE))))
+    powers = chebyshev.cheb2poly(chebyshev.chebfit(nodes, values, DEGREE))
+    piece = Piece(low, high, _padded(powers))
     # Also between the nodes, where the error of interpolation is largest.
     T = np.linspace(low, high, CHECKS_PER_COEFFICIENT * (DEGREE + 1) + 1)
     exact = function(T)

@@ -109,7 +109,8 @@ def parameter(
     ``stretch`` is the power of the area stretch that multiplies it, see :class:`Spec`.
     With the default None the formula defines the behaviour without a value.
     """
-    return field(default=default, metadata={"spec": Spec(unit, text, above, at_least, at_most, varies, stretch)})
+    spec = Spec(unit, text, above, at_least, at_most, varies, stretch)
+    return field(default=default, metadata={"spec": spec})
 
 
 def option(text: str, *, default: Any = dataclasses.MISSING) -> Any:

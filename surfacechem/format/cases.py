@@ -17,6 +17,7 @@ import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from io import BufferedIOBase, TextIOBase
 from pathlib import Path
 from types import ModuleType
@@ -143,10 +144,14 @@ class Case:
             raise InputError(message, self.places[""])
         return self.own_run
 
+    @cached_property
+    def _surrogate_system(self) -> System:
+        return assemble(with_surrogates(self.scene))
+
     def refuse_nothing(self) -> None:
         """Raise InputError if the scene has no state, without computing integrals over surfaces."""
         with self.locating():
-            refuse_static(assemble(with_surrogates(self.scene)), self.file or "CASE")
+            refuse_static(self._surrogate_system, self.file or "CASE")
 
     def system(self) -> System:
         """Assemble the scene; errors get their place in the case file."""

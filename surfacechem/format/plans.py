@@ -248,7 +248,8 @@ class EvenlySpaced:
     def at(self, index: Index) -> Array:
         """Return the values with these numbers, as NumPy's linspace and geomspace."""
         first, last = (np.log10(x) if self.logarithmic else x for x in (self.first, self.last))
-        values = np.asarray(index * ((last - first) / max(self.count - 1, 1)) + first, dtype=float)
+        step = (last - first) / max(self.count - 1, 1)
+        values = np.asarray(index * step + first, dtype=float)
         values = np.power(10.0, values) if self.logarithmic else values
         # Both ends are exact; a power of ten would round them.
         values[index == self.count - 1] = self.last

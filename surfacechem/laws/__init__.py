@@ -131,7 +131,8 @@ def check_own(law: type[Law]) -> None:
 
 def laws_of_module(found: ModuleType) -> list[type[Law]]:
     """Return the laws that a module defines."""
-    return list(dict.fromkeys(value for contract in FAMILIES for value in _stated_in(found, contract)))
+    own = (value for contract in FAMILIES for value in _stated_in(found, contract))
+    return list(dict.fromkeys(own))
 
 
 @contextmanager

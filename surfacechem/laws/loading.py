@@ -120,7 +120,8 @@ class Table(Load):
         # At a jump the later value holds.
         j = bisect_right(self.times, start) - 1
         if j < 0 or j + 1 >= len(self.times):
-            return {"origin": 0.0, "level": self.values[max(j, 0)], "slope": 0.0}
+            edge = max(j, 0)
+            return {"origin": 0.0, "level": self.values[edge], "slope": 0.0}
         slope = (self.values[j + 1] - self.values[j]) / (self.times[j + 1] - self.times[j])
         return {"origin": self.times[j], "level": self.values[j], "slope": slope}
 

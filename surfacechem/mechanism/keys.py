@@ -128,7 +128,8 @@ def _is_masel(kind: str) -> bool:
 def _is_foreign(entry: Any) -> bool:
     """True if a reaction has an unknown type, which may belong to another extension."""
     kind = str(entry.get("type", "Arrhenius"))
-    return "equation" in entry and not (kind_of(kind) or _is_masel(kind) or _needs_neighbour(kind))
+    known = kind_of(kind) or _is_masel(kind) or _needs_neighbour(kind)
+    return "equation" in entry and not known
 
 
 def is_evaluated(entry: Any, names: Iterable[str], neighbours: bool) -> bool:

@@ -266,7 +266,8 @@ class PiecewisePolynomial(NamedTuple):
         if not self.pieces:
             return 0.0
         *below, last = [polynomial(theta, c) for _, c in self.pieces]
-        return by_ranges(theta, list(zip((start for start, _ in self.pieces[1:]), below, strict=True)), last)
+        ends = [start for start, _ in self.pieces[1:]]
+        return by_ranges(theta, list(zip(ends, below, strict=True)), last)
 
     @property
     def integral(self) -> PiecewisePolynomial:

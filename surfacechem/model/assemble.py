@@ -129,7 +129,8 @@ def perturbed(scene: Scene) -> Scene:
 
 def _with_laws(scene: Scene, change: Callable[[Any], Any]) -> Scene:
     """Return the scene with ``change`` applied to its potentials and heat paths."""
-    interface = replace(scene.interface, potentials=tuple(map(change, scene.interface.potentials)))
+    potentials = tuple(map(change, scene.interface.potentials))
+    interface = replace(scene.interface, potentials=potentials)
     return replace(scene, interface=interface, heat=tuple(map(change, scene.heat)))
 
 

@@ -284,7 +284,8 @@ class Build:
         """Return the time derivative of a prescribed variable between its jumps."""
         if name in self.motion.ramp_rates:
             return self.motion.ramp_rates[name]
-        return derivative(next(item.expression for item in self.named if item.name == name), self.t)
+        expression = next(item.expression for item in self.named if item.name == name)
+        return derivative(expression, self.t)
 
     def rate_of(self, name: str) -> Expression:
         """Return the time derivative of a prescribed variable that stores energy; it must not jump."""

@@ -194,7 +194,8 @@ class Variables:
             symbol = self.parameters.add(name + suffix, path, spec, value.value)
             bound = [self.bind(item, f"{path}.{item.name()}", unit=unit_of(item.of)) for item in value.factors]
             symbol = product(symbol, *map(self._factor, bound))
-            bounded = max(spec.above, spec.at_least) > 0 or math.isfinite(spec.at_most)
+            low = max(spec.above, spec.at_least)
+            bounded = low > 0 or math.isfinite(spec.at_most)
             if bounded or not all(factor.keeps_sign for factor in value.factors):
                 self.varying.append((law, name, spec, symbol))
             return symbol

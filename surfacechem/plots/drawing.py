@@ -124,7 +124,8 @@ def _far_side(axes: Axes, body: Body, edge: float, way: int) -> None:
     """Draw the temperature at which the far side of a conducting body, or its coolant, is held."""
     if body.conduction is None or body.conduction.far is None:
         return
-    _arrow(axes, (WIDTH / 2, edge), (WIDTH / 2, edge + way * 0.3))
+    end = edge + way * 0.3
+    _arrow(axes, (WIDTH / 2, edge), (WIDTH / 2, end))
     text = f"far side: {body.conduction.far.at_start():g} K"
     if not body.conduction.held:
         text += f"\nthrough {body.conduction.h_far:g} W/(m² K)"

@@ -281,7 +281,8 @@ def mark_without_end(axes: Sequence[Axes], dataset: Data) -> None:
     x = dataset[dataset["status"].dims[0]].values
     for word in STATUS_MARKERS:
         found = has_no_end(dataset, word)
-        mark(axes, x[(found & ~(found.all() and word == STOPPED)).reshape(len(x), -1).any(axis=1)], word)
+        where = found & ~(found.all() and word == STOPPED)
+        mark(axes, x[where.reshape(len(x), -1).any(axis=1)], word)
 
 
 def mark(axes: Sequence[Axes], x: NDArray[np.float64], word: str) -> None:

@@ -359,7 +359,8 @@ class OverdampedPullOff(CohesiveZoneOnSpring):
     @cached_property
     def end_gap(self) -> float:
         """Gap [m] at `end_time`."""
-        return 0.5 * (self.fold.g + float(self.gap(np.array([self.w]), self.folds[1].g, math.inf)[0]))
+        final = float(self.gap(np.array([self.w]), self.folds[1].g, math.inf)[0])
+        return 0.5 * (self.fold.g + final)
 
     @property
     def end_time(self) -> float:
@@ -405,5 +406,6 @@ class OverdampedPullOff(CohesiveZoneOnSpring):
         near = np.where(np.abs(y) < 0.5, y, 0.0)
         coefficients = [0.0, 0.0, *((-1) ** n * (n - 1 - x) / math.factorial(n) for n in range(2, 20))]
         series = np.polynomial.polynomial.polyval(near, coefficients)
-        shape = np.where(np.abs(y) < 0.5, series, -(1.0 + x) * np.expm1(-y) - x * y - y * np.exp(-y))
+        far = -(1.0 + x) * np.expm1(-y) - x * y - y * np.exp(-y)
+        shape = np.where(np.abs(y) < 0.5, series, far)
         return np.asarray(self.k * self.delta_w + self.t_max * math.exp(-x) * shape)

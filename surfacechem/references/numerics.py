@@ -162,7 +162,8 @@ class AutonomousODE:
                 rates = self._rate(quartered, np.full(len(quartered), of_end))
             # Below the last edge at which the rate differs from that at the end, one panel is enough.
             least, most = sorted(float(rates[-1]) * part for part in (1 - FEW_EPS, 1 + FEW_EPS))
-            last = int(np.flatnonzero(np.append(True, ~((rates >= least) & (rates <= most))))[-1])
+            differs = ~((rates >= least) & (rates <= most))
+            last = int(np.flatnonzero(np.append(True, differs))[-1])
             near = [x + step for x in found for step in (*-steps, 0.0, *steps)]
             points = np.array([0.0, *quartered[: last + 1], *near])
             edges.append(np.unique(points[(points >= 0.0) & (points <= half)]))

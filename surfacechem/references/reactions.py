@@ -272,7 +272,8 @@ class FrictionIgnitedBonding(Reference):
             return np.asarray(T * np.exp(-s) * scaled_expint(2, s))
 
         apart = self.A / heating * (antiderivative(T) - antiderivative(self.T_i))
-        early = (T_E / self.T_i * rise / T < 0.5) & (rise < 0.5 * self.T_i)  # the difference would cancel
+        exponent = T_E / self.T_i * rise / T
+        early = (exponent < 0.5) & (rise < 0.5 * self.T_i)  # the difference would cancel
         soon = short_integral(lambda t: self.A * np.exp(-T_E / (self.T_i + heating * t)), t)
         reacted = np.where(early, soon, apart)
         return {

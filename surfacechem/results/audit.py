@@ -511,7 +511,8 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
     sizes = {name: max(-low, high) for name, (low, high) in trajectory.ranges.items()}
     most, duration = max((sizes.get(name, 0.0) for name in fluxes), default=0.0), trajectory.result.t
     # Heat that roundoff carries over the whole run is compared with the heat content, independent of its zero.
-    least = ERROR_FLOOR * max(sizes.get("E_total", 0.0), trajectory.roundings.get("E_total", 0.0) / EPS)
+    content = trajectory.roundings.get("E_total", 0.0) / EPS
+    least = ERROR_FLOOR * max(sizes.get("E_total", 0.0), content)
     lost = [name for name, size in fluxes.items() if size > LOST_FLUX * most and size * duration > least]
     advice = "let the two share one temperature, or use the heat_into variables, which are exact"
     return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []

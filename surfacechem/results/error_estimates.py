@@ -379,7 +379,8 @@ def _cubic(places: Sequence[float], rows: Array, wanted: Sequence[float]) -> Arr
     """Interpolate rows at other places, by the polynomial through the four nearest points of each."""
     x, at = np.array(places), np.array(wanted)
     width = min(len(x), 4)
-    near = np.clip(np.searchsorted(x, at) - width // 2, 0, len(x) - width)[:, None] + np.arange(width)
+    first = np.clip(np.searchsorted(x, at) - width // 2, 0, len(x) - width)
+    near = first[:, None] + np.arange(width)
     others = ~np.eye(width, dtype=bool)
     factors = (at[:, None, None] - x[near][:, None]) / np.where(others, x[near][:, :, None] - x[near][:, None], 1.0)
     return np.asarray((rows[:, near] * np.prod(factors, axis=2, where=others)).sum(axis=2))

@@ -130,7 +130,8 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
         if slow == -np.inf and event.t < end and event.name != STEADY:
             times.setdefault(event.name if event.jump else f"{KINK}{event.name}", []).append(event.t)
     found = {name: np.array(values) for name, values in times.items()}
-    return found | ({"end": np.array([trajectory.result.t])} if trajectory.status == "stopped" else {})
+    ended = {"end": np.array([trajectory.result.t])} if trajectory.status == "stopped" else {}
+    return found | ended
 
 
 def _lasting(trajectory: Trajectory) -> list[EventRow]:

@@ -372,7 +372,8 @@ def reading(path: Path, read: Callable[[], R]) -> R:
         remedy = f"Write the run to {path.with_suffix('.nc').name}, which holds events, errors and the case, too."
         raise InputError(f"is a table of numbers, which is for other programs. {remedy}", Place(str(path)))
     try:
-        _try_elsewhere(path, READING_TIMEOUT + path.stat().st_size / LEAST_BANDWIDTH)
+        size = path.stat().st_size
+        _try_elsewhere(path, READING_TIMEOUT + size / LEAST_BANDWIDTH)
         return read()
     except FileNotFoundError:
         beside = [other.name for other in path.parent.glob(f"*{path.suffix}")]  # a sweep's file has another name

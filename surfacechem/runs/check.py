@@ -86,7 +86,8 @@ def rates(start: Start) -> NDArray[np.complex128]:
     # Solved for the rates of evolved states and the values of algebraic ones; only the former are kept.
     growth = np.linalg.solve(unknown, -start.K[:, evolves] / scale)[evolves]
     values = np.asarray(np.linalg.eigvals(growth), dtype=np.complex128)
-    return np.asarray(values[np.abs(values) > CONSERVED_RATE * np.max(np.abs(values), initial=0.0)])
+    largest = np.max(np.abs(values), initial=0.0)
+    return np.asarray(values[np.abs(values) > CONSERVED_RATE * largest])
 
 
 def groups(model: Model, scene: Scene, values: Mapping[str, float], start: Start | None, end: float) -> list[Group]:

@@ -57,7 +57,8 @@ class Checked:
     def __str__(self) -> str:
         """The errors in words."""
         known = f"{self.error:.2g} of {self.count} runs ({self.source})" if self.unknown < self.count else ""
-        return "; ".join(filter(None, (known, unknown_in(self.unknown, self.why))))
+        unknown = unknown_in(self.unknown, self.why)
+        return "; ".join(filter(None, (known, unknown)))
 
 
 def checked_arrays(size: int, count: int) -> tuple[dict[str, int], dict[str, StoredArray]]:

@@ -120,7 +120,8 @@ def reaching(system: System, keep: Keep) -> System:
     for name, value in (keep.reach or {}).items():
         expression = symbols.get(name) or system.find(name).expression
         margins.append(Margin(f"{REACHES}{name}", expression - value, f"{name} reaches {value:g}", terminal=False))
-    return replace(system, margins=(*system.margins, *margins), ledger=system.ledger if keep.balances else ())
+    ledger = system.ledger if keep.balances else ()
+    return replace(system, margins=(*system.margins, *margins), ledger=ledger)
 
 
 def reason_table(system: System) -> list[str]:

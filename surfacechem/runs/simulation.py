@@ -298,7 +298,8 @@ class Simulation:
         found = accuracy(trajectory, case.scene, exact, option, added, estimate)
         if unused and option == "auto":
             found = replace(found, source=f"{found.source}; {unused}")
-        return Judgement(found, spatial.unmet_accuracy(case.scene, (errors or [CellErrors()])[0], found))
+        notes = spatial.unmet_accuracy(case.scene, (errors or [CellErrors()])[0], found)
+        return Judgement(found, notes)
 
     def _origin(self, changes: Mapping[str, float]) -> dict[str, Any]:
         """Return the origin of results: texts of the case, changes, and time spent before the run."""

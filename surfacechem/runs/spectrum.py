@@ -48,7 +48,8 @@ def history(system: System, variable: str) -> Expression:
 
 def evolves_bonds(system: System) -> bool:
     """True if bonds evolve."""
-    return bool(system.expand(symengine.Symbol("phi")).free_symbols & {state.symbol for state in system.states})
+    phi = symengine.Symbol("phi")
+    return bool(system.expand(phi).free_symbols & {state.symbol for state in system.states})
 
 
 def breaks_bonds(system: System) -> bool:

@@ -324,7 +324,8 @@ def stream(
             raise InputError(message, path="sweep.keep")
     checked = plan.size if section.checked == ALL else int(section.checked)
     chunks = ChunkRuns(simulation, plan, keep, changes, checked)
-    return Stream(chunks, begin(target, _layout(chunks), resume or part != (1, 1)), part)
+    store = begin(target, _layout(chunks), resume or part != (1, 1))
+    return Stream(chunks, store, part)
 
 
 def _layout(chunks: ChunkRuns) -> Layout:

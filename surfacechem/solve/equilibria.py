@@ -129,7 +129,8 @@ NEWTON_REACH, REST_STEPS = NEGLIGIBLE, 12
 def stiffness(driving: Field, scale: Array, at: Array) -> Array:
     """Return the derivative of each driving traction by each gap, shape (gaps, gaps), from central differences."""
     nudges = np.diag(CBRT_EPS * scale)
-    ahead, behind = np.split(driving(np.vstack([at + nudges, at - nudges])), 2)
+    values = driving(np.vstack([at + nudges, at - nudges]))
+    ahead, behind = np.split(values, 2)
     return np.asarray(((ahead - behind) / (2 * CBRT_EPS * scale)[:, None]).T)
 
 

@@ -166,7 +166,8 @@ def _distance(point: Array, line: Array) -> float:
 def _coincide(one: Line, other: Line) -> bool:
     """True if two curves hide each other."""
     span = float(np.ptp(other.y[np.isfinite(other.y)])) or 1.0
-    return bool(np.nanmax(np.abs(np.interp(one.x, other.x, other.y) - one.y)) < HIDDEN_PART * span)
+    near = np.interp(one.x, other.x, other.y) - one.y
+    return bool(np.nanmax(np.abs(near)) < HIDDEN_PART * span)
 
 
 class ListFigure(NamedTuple):

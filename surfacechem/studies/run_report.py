@@ -152,7 +152,8 @@ def _scene(case: cases.Case, attributes: Mapping[str, Any]) -> Iterator[PageSect
     regime = f"{system.regime}: {REGIMES.get(system.regime, '')}"
     rows = [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]
     words = [text for text in (case.description, case.source and f"Source: {case.source}", regime) if text]
-    tables, acting = [PageTable(("variable", "role", "by"), rows, "Variables")], laws_of(scene)
+    variables = PageTable(("variable", "role", "by"), rows, "Variables")
+    tables, acting = [variables], laws_of(scene)
     surface: Any = scene.surface
     if surface is not None:
         tables.append(PageTable(("body or law", "kind", "numbers"), surface_rows(scene), "Surfaces"))

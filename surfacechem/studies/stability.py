@@ -161,7 +161,8 @@ def stability(
     rows = []
     for number, regime in enumerate(found):
         values = thinned(regime.values) if quick else list(regime.values)
-        log.info("%s: %d values", regime.name, len(values), extra={"done": number, "total": len(found)})
+        done = {"done": number, "total": len(found)}
+        log.info("%s: %d values", regime.name, len(values), extra=done)
         runs = {value: prepared(regime.problem(value), rtol) for value in values}
         rows.append(MatrixRow(regime, values, filled(solvers, runs)))
     corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []
@@ -206,7 +207,8 @@ def prepared(problem: Trial, rtol: float = STUDY_RTOL) -> Callable[[str], Attemp
 def read(problem: Trial) -> Case:
     """Return the case of a problem with its changes."""
     changes = {**problem.changes, "run": {"times": list(problem.times)}}
-    return replace(cases.load(problem.case, changes), reference=None)  # the regime has its own expectation
+    case = cases.load(problem.case, changes)
+    return replace(case, reference=None)  # the regime has its own expectation
 
 
 def _judged(expected: Expectation, rtol: float, known: float, done: Trajectory | Exception) -> Attempt:

@@ -251,7 +251,8 @@ def _sizes(found: Array, gap: float, reach: Array) -> Array:
     """
     force = np.maximum(np.linalg.norm(found[:, 1:4], axis=-1, keepdims=True), TINY)
     # Entries that vanish everywhere have the size of the smallest number.
-    moment = np.maximum(np.linalg.norm(found[:, 4:], axis=-1, keepdims=True), force * gap)
+    turning = np.linalg.norm(found[:, 4:], axis=-1, keepdims=True)
+    moment = np.maximum(turning, force * gap)
     energy = np.maximum(np.abs(found[:, :1]), force * reach)
     return np.concatenate([energy, np.repeat(force, 3, axis=-1), np.repeat(moment, 3, axis=-1)], axis=-1)
 

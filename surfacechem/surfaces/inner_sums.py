@@ -321,7 +321,8 @@ def _circle(surface: Surface, feet: Array, gaps: Array, far: Array, level: int) 
     beyond = np.zeros(len(feet), dtype=bool) if isinstance(surface.shape, Sphere) else edge - feet[:, 0] > far
     radius = np.where(beyond, far, edge)
     middle = np.where(beyond[:, None], start, 0.0)
-    unit = np.maximum(np.where(beyond, radius, radius - feet[:, 0]), gaps / length) / radius
+    left = np.where(beyond, radius, radius - feet[:, 0])
+    unit = np.maximum(left, gaps / length) / radius
     end = np.arcsinh(math.pi / unit)
     t, w = gauss_rule(divided(np.stack([-end, np.zeros_like(end), end], axis=1), level), order_of(level))
     turn = angle[:, None] + unit[:, None] * np.sinh(t)

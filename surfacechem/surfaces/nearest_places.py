@@ -143,7 +143,8 @@ def _lowest(gaps: Array, closed: tuple[bool, bool], noise: float) -> Indices:
     least = gaps <= minimum_filter(gaps, 3, mode=modes) + noise
     least &= np.isfinite(gaps)
     labels, count = label(least, np.ones((3, 3)))
-    return np.array(minimum_position(gaps, labels, range(1, count + 1)), dtype=int)
+    found = minimum_position(gaps, labels, range(1, count + 1))
+    return np.array(found, dtype=int)
 
 
 def _refined(

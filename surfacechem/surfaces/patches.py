@@ -295,7 +295,8 @@ def outer_patches(
     uniform = alike_along(outer, inner), alike_around(outer, inner)
     grain = min(outer.shape.grain, inner.shape.grain)
     near = near_places(outer, inner, size, uniform, grain, budget.take)
-    lengths = np.maximum(np.linalg.norm(outer.derivatives(near.at, FIRST_ORDER)[1:], axis=-1).T, POLE)
+    tangents = outer.derivatives(near.at, FIRST_ORDER)[1:]
+    lengths = np.maximum(np.linalg.norm(tangents, axis=-1).T, POLE)
     first, low, high = near.at[0], *np.transpose(outer.shape.span)
     # Bodies far apart need a larger reach. An infinite parameter is a distance from the axis or along
     # it; where the surface is steep it is also flatter: the root of its radius grows like the length of a step.

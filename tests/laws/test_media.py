@@ -238,7 +238,8 @@ def test_properties_end_where_the_fluid_freezes(fluid, p, T, low):
 
 def test_an_algebraic_temperature_far_from_its_guess_is_found():
     scene = lubricated(medium("Nitrogen", thickness=5e-4), v=870.0, capacity=False)
-    values = computed(solved(scene, 0.0, 1.0))
+    trajectory = solved(scene, 0.0, 1.0)
+    values = computed(trajectory)
     assert values["T_c"][0] > 340.0
     exact = CoolPropFluid("Nitrogen", 1e5)
     for quantity in ("k_m", "eta_m"):

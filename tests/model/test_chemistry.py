@@ -179,7 +179,8 @@ def test_bonds_that_form_and_break_are_of_both_classes(tmp_path):
 @pytest.mark.parametrize("area", [1, 2])
 def test_at_constant_traction_the_fall_of_the_enthalpy_is_the_heat_that_leaves(area, tmp_path):
     load = f"loading: {{F_n: 20 kPa, J_c: {area}}}"
-    data = run(tmp_path, SPRINGS, load, ", g_n: 5 nm").dataset
+    solution = run(tmp_path, SPRINGS, load, ", g_n: 5 nm")
+    data = solution.dataset
     given = (
         data["H_T_c"]
         if "H_T_c" in data

@@ -99,7 +99,8 @@ def test_a_rigid_contact_sends_back_what_hits_it(m, a, g, e):
 def test_a_pressed_contact_bears_pressure_alone(k, E, rate):
     """Complementarity: apart there is no traction; in contact both springs bear the same one."""
     changes = {"mechanics.normal.k": k, "interface.potential.penalty.E_n": E, "loading.w_n.ramp.rate": -rate}
-    data = run(PRESSED, changes).dataset
+    solution = run(PRESSED, changes)
+    data = solution.dataset
     w = 1e-6 - rate * data["time"].values
     scale = np.abs(w).max()
     np.testing.assert_allclose(data["g_n"], np.where(w > 0, w, w * k / (k + E)), rtol=0, atol=1e-10 * scale)

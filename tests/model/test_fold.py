@@ -117,7 +117,8 @@ def gradient(z, w_n, w_t, k_t):
     r = (NORMAL * (w_n - u * G_N) - PHI / G_N * u * e, k_t * (w_t - x * G_T) - 2 * PHI / G_T * x * (1 + u) * e)
     nn = NORMAL + PHI / G_N**2 * (1 - u) * e
     tt = k_t + 2 * PHI / G_T**2 * (1 + u) * (1 - 2 * x**2) * e
-    return r, nn * tt - (-2 * PHI / (G_N * G_T) * u * x * e) ** 2
+    nt = -2 * PHI / (G_N * G_T) * u * x * e
+    return r, nn * tt - nt**2
 
 
 def test_a_fold_of_both_gaps_is_where_the_determinant_vanishes():

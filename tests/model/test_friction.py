@@ -56,7 +56,8 @@ def traction(phi, u):
 
 
 def by_prescribed_gap(t, y):
-    return [lost(y[0], RATE * t)]
+    phi = y[0]
+    return [lost(phi, RATE * t)]
 
 
 def by_spring(t, y):

@@ -43,7 +43,8 @@ PERFECT = {
 
 def run(**parts):
     case = load_text(CASE.format(**PERFECT | parts), "softening.yaml")
-    data = Simulation(case).run(error="balances").dataset
+    solution = Simulation(case).run(error="balances")
+    data = solution.dataset
     assert data.attrs["status"] == "finished", data.attrs["reason"]
     assert data.attrs["energy_error"] < 1e-9
     assert data.attrs["entropy_error"] < 1e-9

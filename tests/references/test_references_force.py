@@ -61,7 +61,8 @@ def test_bell_overflow(row):
 
 def test_cluster_without_rebinding():
     data = table("d_cluster_no_rebinding")
-    bonds = get("shared-load-cluster")(**cluster(0.5))
+    given = cluster(0.5)
+    bonds = get("shared-load-cluster")(**given)
     assert_exact(bonds.end_time, data.expect["tau_star"], relative=1e-15)
     tau, exact = data.columns["tau"], data.columns["N"] / data.parameters["N_t"]
     got = bonds.solution(tau)["phi"]

@@ -167,6 +167,7 @@ def test_fluxes_where_a_shared_temperature_is_prescribed():
     heat = [path("interface", "upper", 100.0)]
     pair = Body("lower", "T_1", Quadratic(C=1000.0)), Body("upper", "T_2", Quadratic(C=50.0))
     scene = Scene(pair, interface, heat, loading | {"T_1": Ramp(start=300.0, rate=1.0)}, None, 300.0, {"T_2": 290.0})
-    values = run(scene, 2.0).everywhere
+    trajectory = run(scene, 2.0)
+    values = trajectory.everywhere
     stored = 3.0 / 300.0 * values("T_1") * 1.0
     assert values("q_1") + values("q_2") == pytest.approx(values("D_coulomb") - stored, rel=1e-12)

@@ -150,7 +150,8 @@ def test_a_pressure_that_jumps_is_one_that_falls_fast(thermal, slider):
 
 def test_libraries_and_sweeps_heat_the_same():
     case = load_text(pressure_falls("paths outward", "rigid", 0).replace("outputs: 5", "outputs: 5, rtol: 1e-9"))
-    run = Simulation(case).run(error="balances").dataset
+    simulation = Simulation(case)
+    run = simulation.run(error="balances").dataset
     other = Simulation(replace(case, own_run=replace(case.run, solver="lsoda"))).run(error="balances").dataset
     np.testing.assert_allclose(other["T_1"], run["T_1"], atol=1e-6)
     partition = Simulation(load_text(pressure_falls("slider", "rigid", 0)))

@@ -343,7 +343,8 @@ def test_a_quotient_of_a_few_states_is_looked_at_only_where_its_divisor_changes(
 
 @pytest.mark.parametrize(("seed", "implicit"), every(19, [(seed, way) for way in (False, True) for seed in range(80)]))
 def test_what_is_narrow_is_seen(seed, implicit, left):
-    simulation = surfacechem.load(narrow_scenes.scene(seed).text)
+    scene = narrow_scenes.scene(seed)
+    simulation = surfacechem.load(scene.text)
     if simulation.model.program.lanes is None or simulation.model.jumper is not None:
         pytest.skip("not for these steps")
     problem, columns = arrays_of(simulation, 1, implicit)

@@ -76,7 +76,8 @@ programme:
   - back: {w_t: -1 mm/s, until: {t_t: {falls-to: -0.2 MPa}}}
   - rest: {for: 0.1 s}
 """
-    times = dict(events(solved(COULOMB + stages + END)))
+    solution = solved(COULOMB + stages + END)
+    times = dict(events(solution))
     assert times["end of load"] == pytest.approx(0.3, rel=1e-12)
     assert times["end of back"] == pytest.approx(0.8, rel=1e-12)
     assert times["end of rest"] == pytest.approx(0.9, rel=1e-12)

@@ -49,7 +49,9 @@ def test_a_pole_beside_the_nearest_place_is_no_place_itself():
 
 
 def test_every_summit_that_is_near_is_found_with_its_exact_gap():
-    shape = bumps(*np.random.default_rng(3).uniform(1e-7, 9e-7, (5, 2)))
+    draw = np.random.default_rng(3)
+    places = draw.uniform(1e-7, 9e-7, (5, 2))
+    shape = bumps(*places)
     found = near_places(Surface(shape), Surface(Plane(), True, 1e-9), 1e-6, (False, False), shape.grain)
     x = np.linspace(0, 1e-6, 2001)
     z = shape.spline(x, x)

@@ -178,7 +178,8 @@ def displacement(build: Build) -> Expression:
     """
     if len(build.motion.slips) == 2:
         return sqrt(sum(symengine.Symbol(slip.d.displacement) ** 2 for slip in build.motion.slips))
-    return build.variables.get("g_t" if driven(build, "g_t") else "u_t", "the adhesion beside friction")
+    name = "g_t" if driven(build, "g_t") else "u_t"
+    return build.variables.get(name, "the adhesion beside friction")
 
 
 def evolve(

@@ -58,7 +58,8 @@ def _driven(build: Build, name: str) -> Expression:
             spec = Spec(quotient(quantity.unit, "s"), f"rate of {name} in the stage {item.name}")
             value = build.parameters.add(f"{name}_rate", f"programme.{item.name}.{name}", spec, item.rates[name])
             rate = rate + where(_during(i), value, 0)
-    build.add(State(quantity, build.scene.initial.get(name, 0.0), STATE_SCALES.get(quantity.unit, 1.0)))
+    start = build.scene.initial.get(name, 0.0)
+    build.add(State(quantity, start, STATE_SCALES.get(quantity.unit, 1.0)))
     build.rows.kinematics(name, rate)
     build.motion.ramp_rates[name] = rate
     return symengine.Symbol(name)

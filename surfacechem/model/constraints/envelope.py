@@ -85,7 +85,8 @@ def softening(
     """
     phi, g_n, n_c = (build.variables.get(name, law) for name in ("phi", "g_n", "n_c"))
     left = build.variables.call(law, law.envelope)
-    agrees = _check(build, law, phi, g_n, law.peak())  # type: ignore[attr-defined]
+    peak = law.peak()  # type: ignore[attr-defined]
+    agrees = _check(build, law, phi, g_n, peak)
     # The envelope moves at the gap's rate, replaced by the velocity if that is a separate variable.
     rate = build.total_derivative(left)
     if build.variables.has("v_n"):

@@ -159,7 +159,8 @@ class Guards:
             return False
         rows = np.vstack((self.now, self.rows(times[1:], step.rows(times[1:]))))
         values = np.where(active, rows, 1.0)
-        quiet = bool(np.all(values * self.sides > 0.0)) and not np.any(_may_dip(self, times, values))
+        heights = values * self.sides
+        quiet = bool(np.all(heights > 0.0)) and not np.any(_may_dip(self, times, values))
         if quiet:
             largest = np.fmax.accumulate(np.fmax(self.largest, np.abs(values)))
             changes = np.diff(np.where(self.due, values, 0.0), axis=0)

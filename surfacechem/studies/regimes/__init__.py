@@ -173,7 +173,8 @@ def three_temperatures(**parameters: float) -> Trial:
         ],
         "loading.Q_c": p["D_0"],
     }
-    times = np.geomspace(min(p["C_c"] / (p["h_1"] + p["h_2"]), 1.0), 10.0, 25).tolist()
+    layer = p["C_c"] / (p["h_1"] + p["h_2"])
+    times = np.geomspace(min(layer, 1.0), 10.0, 25).tolist()
     return Trial("three-temperatures", times, Exact.of(exact), changes)
 
 
