@@ -236,7 +236,8 @@ def _rate_norm(w: Any, rate: Any) -> float:
 
 @compiled
 def first_size(w: Any, span: float) -> float:
-    """First step size: the change of the rate over a small trial step keeps within the tolerance.
+    """First step size: the change of the rate over a small trial step keeps within the tolerance, but it is one in which
+    time resolves loads.
 
     Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, section II.4.
     """
@@ -266,7 +267,8 @@ def first_size(w: Any, span: float) -> float:
     # Divide first: a rate of 1e200 over 1e-200 s would overflow.
     time_scale = trial / change
     exponent = 1.0 / (stage_count(w.member) + 1.0)
-    return min(time_scale * min(1.0, (speed * time_scale) ** -exponent), 0.05 * span)
+    size = max(time_scale * min(1.0, (speed * time_scale) ** -exponent), NEWTON_EPS * w.base)
+    return min(size, 0.05 * span)
 
 
 INVALID, OLD, CURRENT = range(3)
