@@ -250,6 +250,20 @@ def test_random_kinetics(rtol, n, left):
     assert found.counts[:, FIRST_COUNTER].sum() <= 1.2 * single.counts[:, FIRST_COUNTER].sum()
 
 
+@pytest.mark.parametrize("implicit", [False, True])
+def test_work_in_a_segment_that_is_brief_for_the_run(implicit):
+    """The power of 1/(0.1 + s^2) as s goes from -1 to 1/2, in steps of 1e-5 as time resolves them."""
+    t, y, dy = se.symbols("t y dy")
+    s = 1e11 * (t - 1) - 1
+    power = -1e11 * 2 * s / (se.Rational(1, 10) + s**2) ** 2
+    program = compile_program(t, [y], [dy], [], [dy - 1 + y], ledger=[power])
+    shared = problem(replace(program, groups=(0,)), [0.0], [1.0, 1 + 1.5e-11], 1e-9)
+    shared = replace(shared, implicit_lanes=implicit, explicit=not implicit)
+    columns = np.zeros((3, 1)), np.zeros((3, 1, 0)), np.array([np.inf]), np.zeros((1, 1)), shared.segments[None]
+    found = lane_batch.solve_batch(shared, *columns, np.zeros((1, 0)))
+    assert found.ends[:, 3] == pytest.approx([1 / 0.35 - 1 / 1.1] * 3, abs=2e-4)
+
+
 def test_runs_that_turn_stiff_take_implicit_steps_in_lanes(left):
     problem, columns = arrays_of(case_runs.load("three-temperatures"))
     found = lane_batch.solve_batch(replace(problem, implicit_lanes=True), *columns)

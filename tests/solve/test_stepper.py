@@ -356,12 +356,12 @@ def test_a_return_code_without_words_ends_the_step():
 RTOL = 1e-11
 
 
-def booked(rate, end, x_0=0.0, group=0):
+def booked(rate, end, x_0=0.0, group=0, begin=0.0):
     """A quadrature beside x' = 1 - x: its values at the end of a run, and the steps and refusals."""
     t, x, dx = se.symbols("t x dx")
     program = compile_program(t, [x], [dx], [], [dx - 1 + x], ledger=[rate(t, x, dx)])
     program = replace(program, groups=(group,))
-    result = radau.solve(problem(program, [x_0], [0.0, end], RTOL, times=[end]))
+    result = radau.solve(problem(program, [x_0], [begin, end], RTOL, times=[end]))
     assert result.status == Status.FINISHED
     return result.ledger[0], result.counters
 
@@ -379,6 +379,17 @@ def test_work_on_a_gap_that_is_moved_through_a_steep_wall():
     open_work, few = booked(lambda t, x, dx: wall(t), 1.5, group=-1)
     assert abs(open_work - exact) > 1e-6 * 0.1**-9
     assert few.steps < counters.steps
+
+
+def test_work_in_a_segment_that_is_brief_for_the_run():
+    """The power of 1/(0.1 + s^2) as s goes from -1 to 1/2, in steps of 1e-5 as time resolves them."""
+
+    def power(t, x, dx):
+        s = 1e11 * (t - 1) - 1
+        return -1e11 * 2 * s / (se.Rational(1, 10) + s**2) ** 2
+
+    work, _ = booked(power, 1 + 1.5e-11, begin=1.0)
+    assert work == pytest.approx(1 / 0.35 - 1 / 1.1, abs=1e-2)
 
 
 def test_logarithm_of_a_coverage_that_starts_at_zero():

@@ -105,7 +105,8 @@ def _enter(w: Any, lane: int) -> None:
     """Enter the current load segment of a lane: its end and its parameters."""
     i = w.run[lane]
     segment, segments, spacing = w.segment[lane], w.segments[row_of(w.segments, i)], w.spacing[row_of(w.spacing, i)]
-    w.t[lane], w.end[lane] = segments[segment], segments[segment + 1]
+    w.t[lane] = w.entered[lane] = segments[segment]
+    w.end[lane] = segments[segment + 1]
     for j in range(w.parameters.shape[2]):
         w.inputs[1 + 2 * w.n + j, lane] = w.parameters[i, segment, j]
     w.spacing_of[lane] = min(spacing, (w.end[lane] - w.t[lane]) / FEWEST_CHECKS)

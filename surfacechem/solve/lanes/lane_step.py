@@ -146,6 +146,12 @@ def scale_ledger(w: Any, stages: int) -> None:
 
 
 @compiled
+def is_brief(w: Any) -> Any:
+    """True in lanes whose step is too brief for the ledger to shorten it, for the run and for its segment."""
+    return lanes(w.h) < LOOSE_RTOL * smaller(lanes(w.t), lanes(w.end) - lanes(w.entered))
+
+
+@compiled
 def _ledger_norms(w: Any) -> Any:
     """Error norm of the ledger. Accounts of one kind share a scale."""
     h, norm = lanes(w.h), same(0.0)
@@ -158,7 +164,7 @@ def _ledger_norms(w: Any) -> Any:
                 second = larger(second, absolute(lanes(w.fine[w.n + m])))
                 scale = larger(scale, lanes(w.q_scale[m]))
         norm = larger(norm, h * miss * miss / (square_root(miss * miss + 0.01 * second * second) + TINY) / scale)
-    return where(h < LOOSE_RTOL * lanes(w.t), 0.0, norm / ledger_rtol(w.rtol))
+    return where(is_brief(w), 0.0, norm / ledger_rtol(w.rtol))
 
 
 @compiled

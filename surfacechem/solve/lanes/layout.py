@@ -37,9 +37,9 @@ MEMORY = {
     **_arrays("margin margin_before margin_earlier margin_first", "n_margins"),
     **_arrays("margin_quarters", 3, "n_margins"),
     **_arrays("margin_end margin_largest side fired", "n_margins"),
-    # the time, now and at the end of the step; the end of the segment, a time at which a step has to end, and the time
-    # of the next output
-    **_arrays("t t_new end aim next_output"),
+    # the time, now and at the end of the step; start and end of the segment, a time at which a step has to end, and
+    # that of the next output
+    **_arrays("t t_new entered end aim next_output"),
     # this step, the last one and one that failed, the norms of their errors, roots of the first two of these,
     # the next step; how far apart looks at the equations are
     **_arrays("h h_last h_tried norm norm_tried root root_last proposed following spacing_of"),

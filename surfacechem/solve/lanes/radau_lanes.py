@@ -22,6 +22,7 @@ from surfacechem.solve.lanes.lane_step import (
     coefficients_of,
     differentiate_polynomials,
     error_norm,
+    is_brief,
     larger,
     nothing,
     put_inside,
@@ -53,7 +54,7 @@ from surfacechem.solve.radau.linear import PIVOT_PART
 from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
 from surfacechem.solve.radau.step import CONTRACTING, LEAST_CONVERGENT, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.work import JACOBIAN, RATES, RESIDUAL, compiled, evaluate, evaluate_at, weighted_sums
-from surfacechem.tolerances import EPS, LOOSE_RTOL, NEGLIGIBLE, TINY
+from surfacechem.tolerances import EPS, NEGLIGIBLE, TINY
 
 MEMBER, STAGES = 1, 5
 """Member of the family in these steps, and its number of stages."""
@@ -416,7 +417,7 @@ def _integrate_ledger(w: Any) -> Any:
     blank = same(0.0)
     for m in range(w.n, w.columns):
         blank = blank + 0.0 * lanes(w.coarse[m])  # NaN where a rate is, which comparisons would lose
-    return blank + where(h < LOOSE_RTOL * lanes(w.t), 0.0, norm)
+    return blank + where(is_brief(w), 0.0, norm)
 
 
 @compiled

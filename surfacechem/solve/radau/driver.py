@@ -162,15 +162,17 @@ def _start(w: Any, i: int) -> int:
 
 
 @compiled
-def _is_brief(w: Any, h: float) -> bool:
-    """True if a step is too brief for the ledger to shorten it: there the states decide whether the run ends."""
-    return bool(h < LOOSE_RTOL * (w.base + w.tau))
+def _is_brief(w: Any, h: float, remaining: float) -> bool:
+    """True if a step is too brief for the ledger to shorten it, for the run and for its segment: there the states
+    decide whether the run ends.
+    """
+    return bool(h < LOOSE_RTOL * (min(w.base, remaining) + w.tau))
 
 
 @compiled
 def _ledger_limit(w: Any, h: float, remaining: float) -> float:
     """Return the longest next step that the error of the ledger allows; shorter than this one if that is rejected."""
-    norm = 0.0 if _is_brief(w, h) else min(ledger_norm(w, h, remaining), 1e30)
+    norm = 0.0 if _is_brief(w, h, remaining) else min(ledger_norm(w, h, remaining), 1e30)
     h_refused, w.h_refused = w.h_refused, 0.0
     if norm == 0.0:
         return np.inf
@@ -214,7 +216,7 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
         if limit < size:
             restore_sides(w)
             return REPEAT, limit
-        if _is_brief(w, size) and ledger_norm(w, size, left) > 1.0:
+        if _is_brief(w, size, left) and ledger_norm(w, size, left) > 1.0:
             hold_rates(w, size)
     if size > CHECK_PART * spacing:
         # Next to the ends of a segment and to events there may be narrow features.

@@ -236,8 +236,8 @@ def _rate_norm(w: Any, rate: Any) -> float:
 
 @compiled
 def first_size(w: Any, span: float) -> float:
-    """First step size: the change of the rate over a small trial step keeps within the tolerance, but it is one in which
-    time resolves loads.
+    """First step size: the change of the rate over a small trial step keeps within the tolerance, but time resolves
+    loads in it.
 
     Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, section II.4.
     """
