@@ -41,6 +41,7 @@ MOST_DIFFERENCES = 4
 
 def figure(datasets: Sequence[Data], variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
     """Draw several datasets, all of runs or all of sweeps over the same parameter."""
+    datasets = [sweep.arranged(each) if "sweep" in each.attrs else each for each in datasets]
     over, panels = _content(datasets, variables, against)
     if not panels:
         raise InputError("there is nothing to plot: none of the variables varies.")

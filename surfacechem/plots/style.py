@@ -85,6 +85,9 @@ MOST_CURVES = 7
 """Largest number of values of a parameter that are drawn as separate curves: the number of colours."""
 
 
+TOGETHER = "together"
+"""Attribute of a sweep with words for the parameters that change together with the one of the axis."""
+
 DOTS = 160
 """Dots per inch of pictures."""
 
@@ -206,7 +209,7 @@ def headings(plot: Figure, ax: Axes, dataset: Data, above: float = 0.0, more: st
     attributes = dataset.attrs
     title = wrap(str(attributes.get("title", "")), int(TITLE_PER_INCH * plot.get_figwidth())) or [""]
     plot.suptitle("\n".join(title), **TITLE_STYLE)
-    facts = [str(attributes.get("reason", "")) or _ends(dataset)]
+    facts = [str(attributes.get(TOGETHER, "")), str(attributes.get("reason", "")) or _ends(dataset)]
     if (error := error_of(dataset)) is not None:
         exact = str(attributes.get("error_source", "")).startswith("exact")
         exact = exact or any(name.endswith("_exact") for name in dataset)
@@ -496,19 +499,21 @@ def parameter_name(name: str) -> str:
     return symbol(name) if len(head) == 1 or head in GREEK else name.replace("_", " ")
 
 
-def value_label(values: DataVariable, place: int) -> str:
-    """Label a value of a swept parameter with name and unit, in the prefix of all values.
+def value_label(values: DataVariable, *places: int) -> str:
+    """Label a value of a swept parameter, or several, with name and unit, in the prefix of all values.
 
     >>> rates = DataVariable("rate", ("rate",), [0, -1e-10, 2e-9], {"units": "N s-1"})
     >>> [value_label(rates, k) for k in range(3)]
     ['rate = 0 pN s⁻¹', 'rate = −100 pN s⁻¹', 'rate = 2000 pN s⁻¹']
-    >>> value_label(DataVariable("rate", ("rate",), [1e-13, 1e-7], rates.attrs), 1)
-    'rate = 10⁵ pN s⁻¹'
+    >>> value_label(DataVariable("rate", ("rate",), [1e-13, 1e-7], rates.attrs), 0, 1)
+    'rate = 0.1 to 10⁵ pN s⁻¹'
     """
     text, size = prefixed(unit(values), _middle_of_decades(values.values))
-    digits, _, power = f"{values.values[place] / size:.4g}".partition("e")
-    value = raised(f"{digits}·10^{int(power)}").removeprefix("1·") if power else digits
-    return minus(f"{parameter_name(values.name)} = {value} {'' if text == '1' else text}".rstrip())
+    found = []
+    for place in places:
+        digits, _, power = f"{values.values[place] / size:.4g}".partition("e")
+        found.append(raised(f"{digits}·10^{int(power)}").removeprefix("1·") if power else digits)
+    return minus(f"{parameter_name(values.name)} = {' to '.join(found)} {'' if text == '1' else text}".rstrip())
 
 
 def minus(text: str) -> str:
@@ -521,8 +526,12 @@ def minus(text: str) -> str:
 
 
 def member_name(dataset: Data, place: Sequence[int]) -> str:
-    """Return the parameters of a run of a sweep, by its index along each of them."""
-    return ", ".join(value_label(dataset[name], k) for name, k in zip(dataset["status"].dims, place, strict=True))
+    """Return the parameters of a run of a sweep, by its index along each dimension."""
+    labels = []
+    for dim, k in zip(dataset["status"].dims, place, strict=True):
+        along = [name for name in dataset.coords if dataset[name].dims == (dim,)] or [dim]
+        labels += [value_label(dataset[name], k) for name in along]
+    return ", ".join(labels)
 
 
 def curves_by_second(dataset: Data, values: Array) -> list[tuple[Array, str]]:

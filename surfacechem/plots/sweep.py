@@ -13,11 +13,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from surfacechem.errors import InputError, refuse_unknown
+from surfacechem.errors import InputError, listed, refuse_unknown
 from surfacechem.format.plans import RUN_DIMENSION, STATISTICS, Plan, name_parts, recorded_plan
 from surfacechem.plots import style
 from surfacechem.plots.style import COLOURS, MOST_CURVES, Array, symbol, unit, varies
-from surfacechem.plots.time_series import PANELS, Panel, of_kind, wants_log_axis
+from surfacechem.plots.time_series import PANELS, SPIKE_RATIO, Panel, of_kind, wants_log_axis
 from surfacechem.results.netcdf import Data, DataVariable
 
 MOST_MEMBERS = 100
@@ -75,11 +75,12 @@ def varying_numbers(dataset: Data, axes: Sequence[str], known: Sequence[str]) ->
     ends = [name for name in found if len(dataset[name].dims) == len(axes) and not ("error" in name or name in COUNTED)]
     # Fractions, of bonds say, are compared with one: those left of broken bonds are rounding.
     sizes = {name: float(unit(dataset[name]) == "1") for name in ends}
-    first: dict[bytes, str] = {}  # of several with the same values, such as a maximum that is the final value
+    # Of several with the same values, such as a maximum that is the final value, the first; none that is swept itself.
+    first = {thinned(in_each_run(dataset, name)).tobytes(): "" for name in parameters_of(dataset)}
     for name in ends:
         if varies(values := subsample(dataset, name), sizes[name]):
             first.setdefault(values.tobytes(), name)
-    shown = [*first.values()]
+    shown = [*filter(None, first.values())]
     groups = ([name for name in shown if any(re.fullmatch(rank, name) for rank in ranks)] for ranks in TELLING)
     return next(filter(None, groups), ["time_reached"])[:MOST_PANELS]
 
@@ -118,8 +119,12 @@ def ends_are_known(dataset: Data, names: Sequence[str]) -> bool:
 def subsample(dataset: Data, name: str) -> Array:
     """Return the values of a variable, of an evenly spread subset if there are many runs."""
     series = len(dataset[name].dims) > len(dataset["status"].dims)
-    values = (dataset[name].values if series else final_values(dataset, name)).ravel()
-    return np.asarray(values[:: -(-values.size // MOST_POINTS)], dtype=float)
+    return thinned(dataset[name].values if series else final_values(dataset, name))
+
+
+def thinned(values: Array) -> Array:
+    """Return the values in a row, of many an evenly spread subset."""
+    return np.asarray(values.ravel()[:: -(-values.size // MOST_POINTS)], dtype=float)
 
 
 def heat_maps(dataset: Data, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
@@ -210,7 +215,7 @@ def colours(dataset: Data, axes: Sequence[str]) -> ScalarMappable:
 def line_style(dataset: Data, axes: Sequence[str], member: int) -> dict[str, Any]:
     """Return the style of the curve of a run: coloured by its parameter if there is one, with a legend for few runs."""
     shape = dataset["status"].values.shape
-    if RUN_DIMENSION not in axes and np.prod(shape) <= style.MOST_CURVES:
+    if np.prod(shape) <= style.MOST_CURVES:
         place = [int(k) for k in np.unravel_index(member, shape)]
         return {"color": COLOURS[member], "linewidth": 1.3, "label": style.member_name(dataset, place)}
     if RUN_DIMENSION in axes:
@@ -219,10 +224,56 @@ def line_style(dataset: Data, axes: Sequence[str], member: int) -> dict[str, Any
     return {"color": colours(dataset, axes).to_rgba(value), "linewidth": 0.9}
 
 
+def arranged(dataset: Data) -> Data:
+    """Return a sweep with its parameters in the order of the plan, and its runs in the order of their values."""
+    plan = recorded_plan(dataset.attrs["sweep"])
+    coords = sorted(parameters_of(dataset), key=lambda name: [*plan.paths, ""].index(path_of(name, plan)))
+    found = replace(dataset, coords=[*coords, *(name for name in dataset.coords if name not in coords)])
+    found = _along_first(found, coords) if plan.zipped else found
+    for axis in {*axes_of(found)}.intersection(coords):
+        if np.any(np.diff(values := found[axis].values) < 0):
+            order, variables = np.argsort(values), dict(found.variables)
+            for name, each in found.variables.items():
+                if axis in each.dims:
+                    variables[name] = replace(each, source=np.take(each.values, order, each.dims.index(axis)))
+            found = replace(found, variables=variables)
+    return found
+
+
+def _along_first(dataset: Data, together: Sequence[str]) -> Data:
+    """Return a sweep of parameters that change together, along the first one that differs in each run if there is one;
+    an attribute tells the others.
+    """
+    count = dataset.sizes[RUN_DIMENSION]
+    first = next((name for name in together if len({*dataset[name].values.tolist()}) == count), "")
+    if not first:
+        return dataset
+    variables = {
+        name: replace(each, dims=tuple(first if dim == RUN_DIMENSION else dim for dim in each.dims))
+        for name, each in dataset.variables.items()
+    }
+    ends = np.argsort(dataset[first].values)[[0, -1]]
+    words = [style.value_label(dataset[name], *ends) for name in together if name != first]
+    told = {style.TOGETHER: f"along with {listed(words, 3)}"} if words else {}
+    return replace(dataset, variables=variables, attrs={**dataset.attrs, **told})
+
+
+def parameters_of(dataset: Data) -> list[str]:
+    """Return the names of the swept parameters in the dataset."""
+    axes = axes_of(dataset)
+    return [name for name in dataset.coords if len(dataset[name].dims) == 1 and dataset[name].dims[0] in axes]
+
+
+def in_each_run(dataset: Data, parameter: str) -> Array:
+    """Return the value of a swept parameter in each run, shape as the runs."""
+    values, status = dataset[parameter], dataset["status"]
+    own = [dataset.sizes[axis] if axis in values.dims else 1 for axis in status.dims]
+    return np.broadcast_to(values.values.reshape(own), status.source.shape)
+
+
 def effects(dataset: Data, plan: Plan, axes: Sequence[str], names: Sequence[str]) -> Figure:
     """Draw the distribution of each variable, and its median and band over each parameter, for all values of others."""
-    parameters = [name for name in dataset.coords if len(dataset[name].dims) == 1 and dataset[name].dims[0] in axes]
-    parameters.sort(key=lambda name: [*plan.paths, ""].index(path_of(name, plan)))
+    parameters = parameters_of(dataset)
     drawn = plan.sample.draws if plan.sample else {}
     ratios = {axis.path: axis.logarithmic for axis in plan.axes}
     ratios |= {path: draw.over_decades for path, draw in drawn.items()}
@@ -236,9 +287,7 @@ def effects(dataset: Data, plan: Plan, axes: Sequence[str], names: Sequence[str]
             error = style.error_of(dataset, [name])
             style.label(row[0].yaxis, style.quantity_words(whole), unit(whole), values, error=error)
             for ax, parameter in zip(row[1:], parameters, strict=True):
-                own = [dataset.sizes[axis] if axis in dataset[parameter].dims else 1 for axis in axes]
-                over = np.broadcast_to(dataset[parameter].values.reshape(own), whole.values.shape).ravel()
-                effect(ax, over[:: -(-over.size // MOST_POINTS)], values)
+                effect(ax, thinned(in_each_run(dataset, parameter)), values)
         for column, parameter in zip(grid.T[1:], parameters, strict=True):
             for ax in column:
                 style.draw_parameter(ax.xaxis, dataset[parameter], decades[parameter])
@@ -290,8 +339,10 @@ def load_of(dataset: Data) -> str:
 
 MARKERS = "osD"
 
-NEGLIGIBLE_LIFETIME = 0.01
-"""Fraction of the shortest lifetime within which hardly a bond breaks."""
+NEGLIGIBLE_LIFETIME, NEGLIGIBLE_DENSITY = 0.01, 0.01
+"""Fraction of the shortest lifetime within which hardly a bond breaks, and of the lowest peak of densities on a
+logarithmic axis that is drawn.
+"""
 
 PANEL_HEIGHT, LINE_WIDTH = 2.3, 1.2
 """Height of a panel [inch], and width of a curve over the load [points]."""
@@ -327,13 +378,13 @@ def figure_of_rupture(dataset: Data, load: str, variables: Sequence[str] | None 
 
 
 def _draw_over(ax: Axes, dataset: Data, load: str, values: Array, scale: Callable[[Array], Array] = np.asarray) -> None:
-    """Draw values of some runs over the load, evenly spread over those whose most probable load is positive; as one
-    curve if they coincide on this scale.
+    """Draw values of some runs over the load, of many evenly spread over those whose most probable load is positive; as
+    one curve if they coincide on this scale.
     """
     modes, x = dataset[f"{load}_mode"].values, dataset[load].values
     # At low loading rates most bonds break before the load grows, and their peak at zero would dwarf all others.
     inside = np.argwhere(modes > x[0])
-    places = inside if len(inside) else np.argwhere(np.full(modes.shape, True))
+    places = inside if len(inside) >= MOST_CURVES else np.argwhere(np.full(modes.shape, True))
     members = places[style.evenly_spread(len(places), MOST_CURVES)].tolist()
     notes = [f"{len(members)} of {modes.size} runs"] if len(members) < modes.size else []
     shown = np.array([values[tuple(place)] for place in members])
@@ -361,6 +412,10 @@ def _draw_series(ax: Axes, dataset: Data, load: str, name: str) -> None:
         text, size = style.prefixed(unit(dataset[load]), dataset[load].values)
         _draw_over(ax, dataset, load, np.maximum(values * size, 0.0))
         ax.set_ylabel(f"$p$({symbol(load)}) [1/{text}]")
+        peaks = [style.largest(np.asarray(line.get_ydata())) for line in ax.get_lines()]
+        if max(peaks) > SPIKE_RATIO * min(peaks) > 0:
+            style.make_logarithmic(ax.yaxis)
+            ax.set_ylim(bottom=NEGLIGIBLE_DENSITY * min(peaks))
     elif name == "lifetime":
         _draw_over(ax, dataset, load, values, np.log)
         ax.set_ylabel(rf"Lifetime $\tau$({symbol(load)}) [s]")
@@ -431,6 +486,7 @@ MOST_DRAWN = 2
 
 def figure(dataset: Data, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
     """Draw a sweep: the load at rupture, else final values; with ``against`` each run over this variable."""
+    dataset = arranged(dataset)
     plan, axes = plan_of(dataset), axes_of(dataset)
     if against:
         return trajectories(dataset, axes, variables, against)
@@ -497,8 +553,10 @@ def panels(dataset: Data, variables: Sequence[str] | None) -> list[Panel]:
 def _dependent(dataset: Data, axes: Sequence[str], known: Sequence[str]) -> list[list[str]]:
     """Return temperatures and bonds whose final values depend on the sweep; with several parameters one per panel."""
     found, along = [], [name for name in known if len(dataset[name].dims) > len(axes)]
+    swept = [in_each_run(dataset, name).tobytes() for name in parameters_of(dataset)]
     for _, *kind in PANELS[:2]:
-        names = [name for name in of_kind(dataset, along, *kind) if varies(final_values(dataset, name).ravel())]
+        ends = {name: final_values(dataset, name).ravel() for name in of_kind(dataset, along, *kind)}
+        names = [name for name, values in ends.items() if varies(values) and values.tobytes() not in swept]
         found += [[name] for name in names] if len(axes) > 1 else [names] if names else []
     return found
 

@@ -174,16 +174,24 @@ def at_states(dataset: Data, variables: Sequence[str] | None, against: str | Non
     over = against or differing[0]
     names = variables or _usual_at_states(dataset, [name for name in differing if name != over])
     refused = dataset["admissible"].values == 0
+    look = "o-" if _are_path(dataset, over) else "o"
     with style.panels(6.4, 0.7 + 1.9 * len(names), len(names), sharex=True) as (plot, grid):
         order = np.argsort(dataset[over].values, kind="stable")
         for ax, name in zip(grid[:, 0], names, strict=True):
             values = np.where(refused, np.nan, dataset[name].values)
-            ax.plot(dataset[over].values[order], values[order], "o-", markersize=3)
+            ax.plot(dataset[over].values[order], values[order], look, markersize=3)
             style.label(ax.yaxis, symbol(name), unit(dataset[name]), values)
         style.mark(grid[:, 0].tolist(), dataset[over].values[refused], "refused")
         style.label_variable(grid[-1, 0].xaxis, dataset[over])
         style.headings(plot, grid[0, 0], dataset, more=f"{refused.sum()} refused" if refused.any() else "")
     return plot
+
+
+def _are_path(dataset: Data, over: str) -> bool:
+    """True if states follow each other, those of a grid do not: a line would join what is not beside each other."""
+    given = {over, *(name.rpartition("_by_")[2] for name in dataset if "_by_" in name)}
+    steps = [np.diff(dataset[name].values) for name in given]
+    return all((step >= 0).all() or (step <= 0).all() for step in steps)
 
 
 def _usual_at_states(dataset: Data, names: Sequence[str]) -> Sequence[str]:

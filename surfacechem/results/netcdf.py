@@ -134,9 +134,12 @@ class Data:
 
     @classmethod
     def made_of(cls, variables: Iterable[DataVariable], attributes: Mapping[str, Any], file: str = "") -> Data:
-        """Return variables as a dataset; those along themselves, time, and those in an attribute are coordinates."""
+        """Return variables as a dataset; those along themselves, time, and those in an attribute, of the dataset or as
+        xarray writes it of a variable, are coordinates.
+        """
         known, attributes = {each.name: each for each in variables}, dict(attributes)
-        said = [*str(attributes.pop(COORDINATES, "")).split(), "time"]
+        texts = [attributes.pop(COORDINATES, ""), *(each.attrs.get(COORDINATES, "") for each in known.values())]
+        said = {"time", *" ".join(map(str, texts)).split()}
         return cls(known, attributes, [name for name, v in known.items() if v.dims == (name,) or name in said], file)
 
     @classmethod

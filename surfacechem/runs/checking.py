@@ -95,7 +95,7 @@ def check(stream: Stream, threads: int | None = None) -> Checked | None:
     worst = float(np.fmax.reduce(errors, initial=-np.inf))
     # One source per method: the reason against an exact solution, after the semicolon, differs from run to run.
     sources = {each.source.partition(";")[0]: each.source for each in sorted(every, key=lambda each: len(each.source))}
-    why = next((each.why for each in every if each.why), "")
+    why = next((why for each in every for why in each.reasons if why), "")
     return Checked(worst, int(np.isnan(errors).sum()), len(errors), int(destroys), "; ".join(sources.values()), why)
 
 

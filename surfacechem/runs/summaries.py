@@ -178,10 +178,14 @@ def sweep_summary(solution: SweepSolution, written: Path | None, details: bool =
 
 def _run_rows(solution: SweepSolution) -> Rows:
     """Return rows with the ends of the runs of a sweep, or of the first ones, and their parameters."""
-    errors = [f"error {error:.2g}" for error in solution.accuracy.errors] if solution.accuracy else [""] * MOST_RUNS
+    errors, reasons = [""] * MOST_RUNS, [run.reason for run in solution.runs]
+    if accuracy := solution.accuracy:
+        errors = ["error unknown" if math.isnan(error) else f"error {error:.2g}" for error in accuracy.errors]
+        whys = [f"; unknown: {why.removeprefix('unknown: ')}" if why else "" for why in accuracy.reasons]
+        reasons = [f"{reason}{why}" for reason, why in zip(reasons, whys, strict=True)]
     shown = range(min(len(solution.runs), MOST_RUNS))
-    runs = zip(_points_told(solution, shown), solution.runs, errors, strict=False)
-    rows = [(given, run.status, error, run.reason) for given, run, error in runs]
+    runs = zip(_points_told(solution, shown), solution.runs, errors, reasons, strict=False)
+    rows = [(given, run.status, error, reason) for given, run, error, reason in runs]
     if more := len(solution.runs) - len(shown):
         rows.append(("...", f"{more} more", "", ""))
     return rows

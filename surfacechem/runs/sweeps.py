@@ -6,7 +6,7 @@ import json
 import logging
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
@@ -191,8 +191,8 @@ class SweepAccuracy:
     errors: NDArray[np.float64]
     source: str
     exact: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    why: str = ""
-    """Reason why an error is unknown, from one of the runs with an unknown error."""
+    reasons: Sequence[str] = ()
+    """Reason why the error of each run is unknown; '' where it is known."""
 
     @property
     def known(self) -> NDArray[np.float64]:
@@ -201,8 +201,16 @@ class SweepAccuracy:
 
     @property
     def unknown(self) -> str:
-        """Number of runs with an unknown error and the reason, in words; '' if there are none."""
-        return unknown_in(len(self.errors) - len(self.known), self.why)
+        """Numbers of runs with an unknown error and their reasons, in words; '' if there are none."""
+        return "; ".join(unknown_in(len(alike), alike[0]) for alike in grouped(filter(None, self.reasons)))
+
+
+def grouped(texts: Iterable[str]) -> list[list[str]]:
+    """Return texts that differ in their numbers only, of two runs say, in groups."""
+    found: dict[str, list[str]] = {}
+    for text in texts:
+        found.setdefault(NUMBERS.sub("", text), []).append(text)
+    return [*found.values()]
 
 
 def unknown_in(count: int, why: str) -> str:
@@ -247,14 +255,19 @@ def _estimated(done: SweepSolution, second: SweepSolution, cells: Sequence[CellE
     if done.statistics:
         pairs = zip(done.statistics, second.statistics, cells, strict=True)
         errors = [_of_statistics(ours, theirs.__getitem__) + found.largest for ours, theirs, found in pairs]
-        why = UNBROKEN if all(found.converged for found in cells) else CELLS_UNKNOWN
+        reasons = [UNBROKEN if found.converged else CELLS_UNKNOWN for found in cells]
     else:
         runs = zip(done.runs, second.runs, cells, strict=True)
         estimates = [with_cells(estimated(ours, theirs), each) for ours, theirs, each in runs]
         errors = [each.error for each in estimates]
-        why = next((each.source for each in estimates if np.isnan(each.error)), "")
+        reasons = [each.source for each in estimates]
     source = ", ".join([second_run(second.run, "sweep"), *dict.fromkeys(f.source for f in cells if f.variables)])
-    return SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))), why=why)
+    return SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))), reasons=_unknown(errors, reasons))
+
+
+def _unknown(errors: Iterable[float], reasons: Iterable[str]) -> list[str]:
+    """Return the reasons of the runs whose errors are unknown, '' for the others."""
+    return [why if np.isnan(error) else "" for error, why in zip(errors, reasons, strict=True)]
 
 
 def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
@@ -276,7 +289,7 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
     begun = [i for i, run in enumerate(done.runs) if len(run.stored.result.times) > 1]
     if not begun:
         raise InputError("all runs ended at their start.")
-    errors, why = np.full(len(done.runs), np.nan), ENDED_AT_START
+    errors, reasons = np.full(len(done.runs), np.nan), [ENDED_AT_START] * len(done.runs)
     exact = {which: errors.copy() for which in done.statistic_names if which in references.get(name).statistics}
     for i in begun:
         run = done.runs[i]
@@ -285,13 +298,13 @@ def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[
             if i in (begun[0], begun[-1]):
                 exact_values(reference, case.scene, run)
             errors[i] = _of_statistics(done.statistics[i], partial(getattr, reference))
-            why = UNBROKEN if np.isnan(errors[i]) else why
+            reasons[i] = UNBROKEN
             for which, values in exact.items():
                 values[i] = getattr(reference, which)
         else:
             found = against_exact(run, case.scene, name, {}, second().runs[i] if event_times(run) else None)
-            errors[i], why = found.error, found.source if np.isnan(found.error) else why
-    return SweepAccuracy(errors, f"exact solution {name}", exact, why if np.isnan(errors).any() else "")
+            errors[i], reasons[i] = found.error, found.source
+    return SweepAccuracy(errors, f"exact solution {name}", exact, _unknown(errors, reasons))
 
 
 def _of_statistics(found: Mapping[str, float], exact: Callable[[str], float]) -> float:
@@ -400,12 +413,9 @@ class SweepSolution(Results):
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """Warnings for readers of the results, each in the words of the first run that it is about."""
-        found: dict[str, list[str]] = {}
-        for run, balances in zip(self.runs, self.audits, strict=True):
-            for text in run_warnings(run, balances, verdicts(run, balances)):
-                found.setdefault(NUMBERS.sub("", text), []).append(text)
-        every = len(self.runs)
-        return tuple(f"{len(texts)} of {counted(every, 'run')}: {texts[0]}" for texts in found.values())
+        pairs = zip(self.runs, self.audits, strict=True)
+        alike = grouped(text for run, own in pairs for text in run_warnings(run, own, verdicts(run, own)))
+        return tuple(f"{len(texts)} of {counted(len(self.runs), 'run')}: {texts[0]}" for texts in alike)
 
     def worst(self, balance: str) -> float:
         """Return the largest error over all runs of the balance of energy, entropy or site."""
@@ -466,8 +476,7 @@ class SweepSolution(Results):
         load = along.pop(self.inner, None)
         species = coverage_columns(self.system, along.values())
         columns = [*self._coordinates(load), *along.values(), *species, *self._of_runs()]
-        columns += event_columns(self.runs, shape)
-        columns += self._single() if load is None else []
+        columns += [*event_columns(self.runs, shape), *self._single()]
         for which in self.statistic_names:
             name, unit, text = which, "s", "mean lifetime"
             if self.plan.load:

@@ -260,6 +260,10 @@ def test_tractions_are_drawn_over_what_the_states_differ_in():
     assert line.get_xdata() == pytest.approx([-4e-9, -2e-9, 2e-9])
     assert line.get_ydata() == pytest.approx([-200e3, -100e3, 0])
     assert "[nm]" in plot.axes[-1].get_xlabel()
+    assert line.get_linestyle() == "None"  # in this order they are no path
+    path, grid = {"g_n": [-4e-9, -2e-9, 2e-9]}, {"g_n": [-4e-9, -4e-9, -2e-9, -2e-9], "v": [0.1, 0.2, 0.1, 0.2]}
+    looks = [figure(case.evaluate(points)).axes[0].get_lines()[0].get_linestyle() for points in (path, grid)]
+    assert looks == ["-", "None"]
     (slope,) = figure(data, ["t_n_by_g_n"], "t_n").axes
     assert np.all(np.diff(slope.get_lines()[0].get_xdata()) >= 0)
     with pytest.raises(InputError, match="no variable 't' at the states"):

@@ -8,6 +8,7 @@ import surfacechem
 from surfacechem import plots
 from surfacechem.errors import InputError
 from surfacechem.quantities import BOLTZMANN
+from surfacechem.results.netcdf import save_kept
 from surfacechem.results.store import opened
 
 pytestmark = pytest.mark.around
@@ -111,6 +112,42 @@ def test_a_number_of_each_run_is_no_curve_of_it(drawn, grid):
     for data, names, against, single in ((drawn, ["T_last"], "K_0", "T_last"), (grid, ["T"], "K_0", "K_0")):
         with pytest.raises(InputError, match=f"{single} does not go along the runs. Leave `against` out"):
             plots.figure(data, names, against)
+
+
+@pytest.mark.parametrize("written", [False, True])
+def test_parameters_that_change_together_are_drawn_as_the_first_of_them(written, tmp_path):
+    """In its order, with the others beside it: the same from memory and from a file of kept series."""
+    section = {"combine": "zip", "over": {K_0: [300.0, 100.0, 200.0], "initial.T": [310.0, 290.0, 300.0]}}
+    case = surfacechem.load("exothermic", {"sweep": {"checked": 0, "keep": {"series": ["T", "phi"]}, **section}})
+    if written:
+        data = save_kept(case.stream(case.plan(), tmp_path / "o.zarr").run().dataset, tmp_path / "o.nc")
+    else:
+        data = case.sweep().dataset
+    for ax in (ends := plots.figure(data)).axes:
+        assert ax.lines[0].get_xdata().tolist() == [100, 200, 300]
+        assert np.all(np.diff(ax.lines[0].get_ydata()) > 0)
+    assert [ax.get_ylabel().split()[1] for ax in ends.axes] == ["$T$", r"$\phi$"]
+    assert ends.axes[0].get_title("left").startswith("along with initial T = 290 to 310 K   3 finished")
+    (series,) = plots.figure(data, ["T"], "time").axes
+    assert words(series)[1] == "$K_{0}$ = 200 J m⁻², initial T = 300 K"
+    assert len({line.get_color() for line in series.lines}) == 3
+
+
+def test_runs_that_no_single_parameter_tells_apart_have_the_names_of_all():
+    over = {K_0: [100.0, 100.0, 200.0], "initial.T": [290.0, 300.0, 300.0]}
+    case = surfacechem.load("exothermic", {"sweep": {"combine": "zip", "over": over}})
+    data = case.sweep().dataset
+    assert words(plots.figure(data, ["T"], "time").axes[0])[1] == "$K_{0}$ = 100 J m⁻², initial T = 300 K"
+    assert len(plots.figure(data, ["phi_last"]).axes) == 3  # a distribution, and an effect of each
+
+
+def test_a_swept_temperature_is_an_axis_and_no_result(tmp_path):
+    over = {"interface.temperature": [320.0, 280.0, 300.0]}
+    case = surfacechem.load("catch-bond", {"sweep": {"checked": 0, "over": over}})
+    for data in (case.sweep(over).dataset, case.stream(case.plan(), tmp_path / "o.zarr").run().dataset):
+        (ax,) = plots.figure(data).axes
+        assert "phi" in ax.get_ylabel()
+        assert ax.lines[0].get_xdata().tolist() == [280, 300, 320]
 
 
 def test_what_is_briefer_than_the_outputs_of_a_sweep_is_told():
@@ -311,16 +348,31 @@ def test_the_figure_has_spectrum_distributions_and_lifetimes(spectrum):
     assert forces.get_legend().get_lines()[-1].get_color() == "black"
     for line, which in zip(dots, ("mode", "median", "mean"), strict=True):
         assert line.get_ydata() == pytest.approx(spectrum[f"f_{which}_exact"].values / 1e-12)
-    # At 1 pN/s most bonds break before there is a force.
-    assert words(density) == ["rate = 100 pN s⁻¹", "rate = 1000 pN s⁻¹"]
-    assert (density.get_title("right"), lifetime.get_yscale()) == ("2 of 3 runs", "log")
-    (common,) = lifetime.get_lines()  # as the curves of both rates coincide
+    assert words(density) == [f"rate = {rate} pN s⁻¹" for rate in (1, 100, 1000)]
+    assert (density.get_yscale(), lifetime.get_yscale()) == ("linear", "log")
+    (common,) = lifetime.get_lines()  # as the curves of all rates coincide
     assert np.isfinite(common.get_ydata()).sum() == np.isfinite(spectrum["lifetime"].values).any(axis=0).sum()
-    assert lifetime.get_title("right") == "2 of 3 runs, their curves coincide"
+    assert lifetime.get_title("right") == "the curves of all runs coincide"
     for line in density.get_lines():
         x, y = (values[np.isfinite(line.get_ydata())] for values in line.get_data())
         assert np.trapezoid(y, x / 1e-12) == pytest.approx(1, abs=2e-3)  # [1/pN] over [pN]
         assert y.min() >= 0
+
+
+def test_each_distribution_is_seen_where_peaks_differ_much_or_bonds_break_at_once(spectrum):
+    """As those of a catch bond, most of which break before there is a force."""
+    over = {"loading.f.ramp.rate": [1e-12, 1e-11, 1e-9]}
+    case = surfacechem.load("catch-bond", {"loading.f": {"ramp": {"rate": "1 pN/s"}}})
+    density = plots.figure(case.sweep(over, {"f": "150 pN"}).dataset).axes[1]
+    assert (len(density.get_lines()), density.get_yscale()) == (3, "log")
+    peaks = [np.nanmax(line.get_ydata()) for line in density.get_lines()]
+    low, high = density.get_ylim()
+    assert 0 < low < min(peaks) < max(peaks) < high
+    over["loading.f.ramp.rate"] = np.geomspace(1e-14, 1e-9, 20)  # of many rates those with a peak
+    many = surfacechem.load("force-spectroscopy").sweep(over, {"f": "150 pN"}).dataset
+    density = plots.figure(many).axes[1]
+    assert density.get_title("right") == "7 of 20 runs"
+    assert all(np.nanargmax(line.get_ydata()) > 0 for line in density.get_lines())
 
 
 def test_a_second_parameter_has_colours_and_statistics_have_markers():
@@ -361,6 +413,6 @@ def test_variables_are_drawn_over_the_load_or_over_the_rate(spectrum):
     (each,) = plots.figure(spectrum, ["phi"], "f").axes
     assert [len(line.get_xdata()) for line in each.get_lines()] == 3 * [spectrum.sizes["f"]]
     (alone,) = plots.figure(spectrum, ["lifetime"]).axes  # beside its headings there is no room
-    assert (alone.get_title("right"), alone.get_title("left")[-21:]) == ("", "their curves coincide")
+    assert (alone.get_title("right"), alone.get_title("left")[-17:]) == ("", "all runs coincide")
     (over_rate,) = plots.figure(spectrum, ["f_mean"]).axes
     assert over_rate.get_lines()[0].get_xdata().tolist() == [1e-12, 1e-10, 1e-9]

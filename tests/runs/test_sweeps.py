@@ -66,6 +66,8 @@ def test_outputs_of_a_spectrum_are_at_equal_forces(spectrum):
     one = data.isel(rate=30)
     np.testing.assert_allclose(one["time"] * one["rate"], data["f"], rtol=1e-12)
     bond = build("bell-ramp", {}, k_off=0.1, x_off=4e-10, T=300.0, rate=one["rate"].item())
+    np.testing.assert_allclose(data["f_last"], data["rate"] * data["time_reached"], rtol=1e-12)
+    assert (one["phi_max"].item(), one["phi_min"].item()) == (1.0, one["phi_last"].item())
     reached = np.isfinite(one["phi"].values)
     exact = bond.solution(one["time"].values[reached])["phi"]
     np.testing.assert_allclose(one["phi"].values[reached], exact, rtol=1e-8, atol=1e-16)
@@ -301,6 +303,9 @@ def test_why_an_error_is_not_known_is_said_once(tmp_path):
     why = "unknown in 1 run: a second run at rtol 1e-13, which had other events"
     assert swept.accuracy.unknown.startswith(why)
     assert str(sweep_summary(swept, None).facts).count(why) == 1
+    _, (*_, error, told) = sweep_summary(swept, None, details=True).tables["Runs"]
+    assert error == "error unknown"
+    assert f"; {why.replace(' in 1 run', '')}" in told
     assert why in swept.dataset.attrs["error_source"]
     stream = case.stream(swept.plan, tmp_path / "s.zarr")
     stream.run()
