@@ -220,6 +220,9 @@ class LoadedRate(cantera.ExtensibleRate):
         evaluate()
         found: float = value[0]
         law = self.bound
+        if not math.isfinite(found):
+            told = ", ".join(f"{name} = {arguments[i]:g}" for i, name in ((0, "T"), *reads))
+            raise ValueError(f"a rate of type {self.kind} has no value at {told}.")
         if found > TOP and law is not None and found > max(law.A * data.T**law.b, 1.0) * TOP and not self.capped:
             self.capped = True
             warnings.warn(

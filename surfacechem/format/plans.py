@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
@@ -227,6 +227,10 @@ STATISTICS = {"mode": "most probable", "median": "median", "mean": "mean"}
 
 INTEGRATED_PATHS = ("surface.bodies.", "surface.laws.", "surface.heat.", "surface.approach.", "surface.accuracy")
 """Prefixes of the paths of parameters of integrals over surfaces."""
+
+INTEGRATED = "shapes and laws of the gap are in integrals that are made once; give each value a run, by --set."
+TABULATED = "it is a table of times, which is no number. Sweep a value or a ramp; give each table a run, by --set."
+"""Reasons why parameters cannot be swept."""
 
 RUN_DIMENSION = "run"
 """The dimension along which several parameters change together."""
@@ -471,14 +475,16 @@ def plan_of(
     units: Mapping[str, str],
     until: Mapping[str, float] | None = None,
     arrays: Mapping[str, Array] | None = None,
+    tables: Iterable[str] = (),
 ) -> Plan:
-    """Return the plan in SI; ``units`` are those of the changeable parameters, by path.
+    """Return the plan in SI; ``units`` are those of the changeable parameters, by path, ``tables`` paths of histories.
 
     ``until`` and ``arrays``, values in SI, override those of the section.
     """
     arrays = arrays or {}
     if not section.over and section.sample is None:
         raise section.error(NOTHING_SWEPT)
+    _refuse_fixed(section, tables)
     axes = [_axis(path, tree, units, arrays.get(path)) for path, tree in section.over.items()]
     sample, trees = None, dict(zip((axis.path for axis in axes), section.over.values(), strict=True))
     if (drawn := section.sample) is not None:
@@ -517,12 +523,17 @@ def read_until(tree: Tree) -> Mapping[str, float]:
     return SWEEP_END.read(tree, "until", Context())
 
 
+def _refuse_fixed(section: SweepSection, tables: Iterable[str]) -> None:
+    """Raise InputError for a parameter that no run of a sweep can change."""
+    fixed = dict.fromkeys(INTEGRATED_PATHS, INTEGRATED) | {f"{path}.": TABULATED for path in tables}
+    for path, tree in {**section.over, **(section.sample.of if section.sample else {})}.items():
+        if why := next((why for start, why in fixed.items() if f"{path}.".startswith(start)), ""):
+            raise tree.error(f"{path} cannot be swept: {why}")
+
+
 def _known(path: str, tree: Tree, units: Mapping[str, str]) -> str:
     """Return the path of a parameter; InputError if there is none."""
     path = parameter_path(path, units)
-    if path.startswith(INTEGRATED_PATHS):
-        text = "shapes and laws of the gap are in integrals that are made once; give each value a run, by --set."
-        raise InputError(f"{path} cannot be swept: {text}", tree.place)
     refuse_unknown([path], units, "no parameter '{}' to sweep", tree.place, PATHS)
     return path
 

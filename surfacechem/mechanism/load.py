@@ -20,7 +20,7 @@ from surfacechem.documents.cache_folder import PACKAGE, cache_root, fingerprint,
 from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
 from surfacechem.mechanism.evaluated import EvaluatedReaction, Neighbour, NeighbourReaction, SurfaceEngine, hold
 from surfacechem.mechanism.keys import PhaseCheck, has_neighbours, is_evaluated
-from surfacechem.mechanism.rates import kind_of, plain
+from surfacechem.mechanism.rates import kind_of, names, plain
 from surfacechem.mechanism.source import MECHANISM_LIMITS, Source, own_parameters, sides
 from surfacechem.mechanism.thermo import (
     KEY,
@@ -211,6 +211,8 @@ def _cantera(source: Source, phase: Any) -> tuple[Any, tuple[str, ...]]:
         noise = re.compile(r"^(\*+|\^|)$|^[|>]|thrown by|[Ee]rror on lines?")
         lines = dict.fromkeys(line.strip() for line in str(error).splitlines())
         message = " ".join(line for line in lines if not noise.search(line)) or "the mechanism cannot be read"
+        if kind := re.search(r"Unknown reaction rate type '(?:interface-)?([^']*)'", message):
+            message = f"no rate type '{kind[1]}'.{suggestion(kind[1], names())}"
         place = Place(source.file, int(found[1]) if found else source.place(phase).line)
         raise InputError(f"Cantera: {message}", place) from None
     said = dict.fromkeys(" ".join(str(item.message).split()) for item in caught)

@@ -81,7 +81,9 @@ def _body(axes: Axes, body: Body, bottom: float) -> None:
     axes.add_patch(Rectangle((0, bottom), WIDTH, HEIGHT, facecolor=BODY, edgecolor=SPRING))
     lines = [_temperature(body.temperature)]
     lines += [f"capacity: {body.energy.title}"] if body.energy else ["reservoir"]
-    lines += [f"conducts, {body.conduction.cells or 'as one lump:'} cells"] if body.conduction else []
+    if law := body.conduction:
+        cells = f"cells to {law.accuracy:g}" if law.accuracy else f"{law.cells} cells"
+        lines.append(f"conducts, {cells if law.cells else 'as one lump'}")
     middle = bottom + HEIGHT / 2
     axes.text(WIDTH / 2, middle + 0.26, body.name, ha="center", va="center", weight="bold", fontsize=9)
     axes.text(WIDTH / 2, middle + 0.12, "\n".join(lines), ha="center", va="top", fontsize=SIZE, linespacing=1.35)

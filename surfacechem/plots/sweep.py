@@ -433,25 +433,20 @@ def _draw_statistics(ax: Axes, dataset: Data, words: Mapping[str, str], size: fl
     style.draw_parameter(ax.xaxis, parameter)
     x = parameter.values
     large = 3.5 if len(x) < MOST_LARGE_MARKERS else 2.0
-    seconds = [label for _, label in style.curves_by_second(dataset, dataset[next(iter(words))].values)]
+    several = len(dataset["status"].dims) > 1
     for name, marker, own in zip(words, MARKERS, COLOURS, strict=False):
-        for (values, _), colour in zip(
-            style.curves_by_second(dataset, final_values(dataset, name)), COLOURS, strict=False
-        ):
-            ax.plot(x, values / size, marker, color=colour if len(seconds) > 1 else own, markersize=large, label="_")
-    for label, colour in zip(filter(None, seconds), COLOURS, strict=False):
+        drawn = style.curves_by_second(dataset, final_values(dataset, name))
+        for (values, _), colour in zip(drawn, COLOURS, strict=False):
+            ax.plot(x, values / size, marker, color=colour if several else own, markersize=large)
+    for (_, label), colour in zip(drawn if several else (), COLOURS, strict=False):
         ax.plot([], [], color=colour, label=label)
     for word, marker, colour in zip(words.values(), MARKERS, COLOURS, strict=False):
-        ax.plot([], [], marker, color="black" if len(seconds) > 1 else colour, markersize=large, label=word)
-    _draw_exact(ax, dataset, [f"{name}_exact" for name in words if f"{name}_exact" in dataset], size, large / 3)
-
-
-def _draw_exact(ax: Axes, dataset: Data, names: Sequence[str], size: float, width: float) -> None:
-    """Draw exact results of each run as black dots of a width [pt], on the points of the runs."""
-    x = dataset[dataset["status"].dims[0]].values
-    found = [values for name in names for values, _ in style.curves_by_second(dataset, final_values(dataset, name))]
-    for j, values in enumerate(found):
-        ax.plot(x, values / size, "o", color="black", markersize=width, label="_" if j else "exact")
+        ax.plot([], [], marker, color="black" if several else colour, markersize=large, label=word)
+    exact = [f"{name}_exact" for name in words if f"{name}_exact" in dataset]
+    for k, name in enumerate(exact):
+        for j, (values, _) in enumerate(style.curves_by_second(dataset, final_values(dataset, name))):
+            label = "_" if j + k else "exact"
+            ax.plot(x, values / size, "o", color="black", markersize=large / 3, label=label)
 
 
 def lifetimes(dataset: Data) -> Figure:

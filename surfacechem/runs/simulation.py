@@ -572,6 +572,7 @@ class Simulation:
             Where there is no parameter of a path, or nothing to sweep.
         """
         from surfacechem.format.plans import plan_of, read_sweep, read_until, split_arrays
+        from surfacechem.laws.loading import Table
 
         section = self.case.sweep
         lists, arrays = split_arrays(over or {})
@@ -582,7 +583,8 @@ class Simulation:
             message = "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over."
             raise InputError(message, path="sweep")
         ends = None if until is None else read_until(from_plain(dict(until), Place(OVERRIDE, path="sweep.until")))
-        return plan_of(section, self.units, ends, arrays)
+        tables = [f"loading.{name}" for name, load in self.case.scene.loading.items() if isinstance(load, Table)]
+        return plan_of(section, self.units, ends, arrays, tables)
 
     @cached_property
     def units(self) -> dict[str, str]:

@@ -263,7 +263,7 @@ def check_summary(
     """Describe a scene in words, with its dimensionless numbers and warnings; ``sweep`` describes its sweep."""
     sections: dict[str, Sequence[Sequence[str]]] = {
         "Choices": choices,
-        "States": _state_rows(system),
+        "States": _state_rows(system, scene),
         "Roles": [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"],
         "Modes": [(mode.name, mode.legend) for mode in system.modes if len(mode.words) > 1],
         "Transitions": list(dict.fromkeys((item.name, item.reason) for item in system.edges)),
@@ -353,16 +353,20 @@ def _compiled(system: System, run: Run) -> str:
     return "all of the run; Python prepares it and looks at its results"
 
 
-def _state_rows(system: System) -> list[tuple[str, ...]]:
+def _state_rows(system: System, scene: Scene) -> list[tuple[str, ...]]:
     """Return rows of states with unit, kind, initial value and meaning; the states inside a body are one row."""
     starts = {state.name: state.initial for state in system.states}
     rows: list[tuple[str, ...]] = []
     for s in system.own_states.values():
         kind, start = ("algebraic", "guess") if s.algebraic else ("evolved", "from")
         rows.append((s.name, f"[{s.quantity.unit}]", kind, f"{start} {s.initial:g}", s.quantity.long_name))
+    asked = {body.name: body.conduction.accuracy for body in scene.bodies if body.conduction}
     for p in system.profiles:
         start = f"from {starts[p.states[0]]:g}" if p.states else ""
-        rows.append((p.name, "[K]", "evolved", start, f"temperatures across {p.body}, in {len(p.points) - 1} cells"))
+        # For an accuracy a run finds their number.
+        number = f"as many cells as an accuracy of {asked[p.body]:g} takes" if asked[p.body] else ""
+        cells = number or f"{len(p.points) - 1} cells"
+        rows.append((p.name, "[K]", "evolved", start, f"temperatures across {p.body}, in {cells}"))
     return rows
 
 

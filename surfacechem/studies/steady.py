@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surfacechem.errors import InputError, refuse_unknown
+from surfacechem.errors import InputError, listed, refuse_unknown
 from surfacechem.format import Overrides, Source
 from surfacechem.model.system import System
 from surfacechem.quantities import GAS_CONSTANT
@@ -98,23 +98,27 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
         If the case has a history or jumps, or reaches no steady state.
     """
     simulation = load(source, overrides)
-    system = simulation.system.with_multipliers()
-    labels = system.reactions
-    refuse_histories(system)
-    if system.has_arcs:
-        raise InputError("the scene has jumps, so that a steady state is not the root of one set of equations.")
-    rest = _Rest(Model(system), simulation.case.run, _wanted(system, of), _conserved(simulation.case.scene.interface))
-    if not of:
-        rest.drop_small()
-    rates, held = rest.outputs(rest.x), _held(system, rest.values)
-    found = [*zip(rest.quantities, rest.x.tolist(), strict=True)]
-    for (name, j), rate in zip(rest.wanted.items(), rates, strict=True):
-        if abs(rate) <= LOOSE_RTOL * rest.largest[j]:
-            raise InputError(f"{name} is zero at rest, so nothing controls it. Ask for what goes on there.")
+    case = simulation.case
+    with case.locating():
+        system = simulation.system.with_multipliers()
+        labels = system.reactions
+        refuse_histories(system)
+        if system.has_arcs:
+            names = listed(list(dict.fromkeys(edge.name for edge in system.edges)), 4)
+            message = f"the scene has jumps ({names}), so that a steady state is not the root of one set of equations."
+            raise InputError(message, path="interface")
+        rest = _Rest(Model(system), case.run, _wanted(system, of), _conserved(case.scene.interface))
+        if not of:
+            rest.drop_small()
+        rates, held = rest.outputs(rest.x), _held(system, rest.values)
+        found = [*zip(rest.quantities, rest.x.tolist(), strict=True)]
+        for (name, j), rate in zip(rest.wanted.items(), rates, strict=True):
+            if abs(rate) <= LOOSE_RTOL * rest.largest[j]:
+                raise InputError(f"{name} is zero at rest, so nothing controls it. Ask for what goes on there.")
     changes = np.array([rest.response([f"multiplier.{label}"]) / rates for label in labels])
     barriers = GAS_CONSTANT * rest.values[held[0]] * rest.response(held) / rates if held else np.empty(0)
     return SteadyState(
-        simulation.case.title,
+        case.title,
         rest.time,
         {q.species: x if x > TRACE_COVERAGE else 0.0 for q, x in found if q.species},
         {q.name: x for q, x in found if not q.species},
@@ -135,7 +139,8 @@ def _wanted(system: System, of: Sequence[str]) -> dict[str, int]:
     refuse_unknown(of, names, "the case has no quantity '{}'")
     wanted = [*of] or [name for name in names if name.startswith("production_")]
     if not wanted:
-        raise InputError("nothing is made in a neighbour: name the rates that matter, `--of R_R1` for instance.")
+        rate = next((name for name in names if name.startswith("R_")), "NAME")
+        raise InputError(f"nothing is made in a neighbour: name the rates that matter, `--of {rate}` for instance.")
     return {name: names[name] for name in wanted}
 
 

@@ -231,6 +231,11 @@ class TestCheck:
         assert "  bonding    linear-affinity     c_r = 6.7e+15 1/(J s)\n" in text
         assert "  capacity   quadratic, 2 times  C = 1 J/(m^2 K)\n" in text
 
+    def test_cells_that_a_run_finds_have_no_number_before_it(self, call):
+        text = call("check", "epoxy-cure-thick").stdout
+        assert "across laminate, in as many cells as an accuracy of 0.0001 takes\n" in text
+        assert "across tool, in 4 cells\n" in text
+
     def test_how_a_sweep_steps_is_told(self, call):
         swept = ["sweep.over={initial.T_2: [300 K, 310 K]}", "sweep.keep={last: [T_c]}"]
         text = call("check", "dna-adhesive", *(part for change in swept for part in ("--set", change))).stdout

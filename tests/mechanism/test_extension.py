@@ -192,6 +192,14 @@ def test_forces_by_species():
         surface.forward_rate_constants  # noqa: B018
 
 
+@pytest.mark.parametrize("f", [math.nan, math.inf, {"AB(s)": math.nan}])
+def test_a_force_that_is_no_number_is_refused(f):
+    surface = LoadedInterface(yaml=HEAD + entry("Bell"), name="contact")
+    surface.f = f
+    with pytest.raises(ValueError, match=r"a rate of type Bell has no value at T = 300, f = (nan|inf)"):
+        surface.net_production_rates  # noqa: B018
+
+
 def test_exponents_of_a_thousand_are_no_infinity():
     surface = LoadedInterface(yaml=HEAD + entry("Bell"), name="contact")
     surface.TP = 300.0, ct.one_atm

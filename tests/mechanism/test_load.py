@@ -93,6 +93,12 @@ def test_another_text_phase_library_or_code_is_read_again(asked, monkeypatch):
     assert (rate(), len(asked)) == (3, 6)
 
 
+def test_a_rate_type_that_cantera_does_not_know_is_told_the_nearest():
+    text = PAIR.replace("equation: bond", "type: Bel, equation: bond")
+    with pytest.raises(InputError, match=r"m.yaml:8: Cantera: no rate type 'Bel'\. Did you mean 'Bell'"):
+        load_mechanism(Path(), name="m.yaml", text=text, evaluate=True)
+
+
 def test_a_mechanism_of_several_files_is_read_from_them_each_time(tmp_path, monkeypatch, folder):
     monkeypatch.chdir(tmp_path)
     Path("air.yaml").write_text(AIR)

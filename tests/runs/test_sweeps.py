@@ -277,6 +277,13 @@ def test_what_is_wrong_in_a_sweep_is_where_it_is_given(changes, given, message):
         surfacechem.load(PULLED, [changes] if changes else []).sweep(**given)
 
 
+@pytest.mark.parametrize("path", ["loading.f", "loading.f.table.values"])
+def test_a_table_is_no_number_to_sweep(path):
+    case = surfacechem.load(PULLED, {"loading.f": {"table": {"times": [0, 1], "values": [0, 1e-11]}}})
+    with pytest.raises(InputError, match=f"override: .*{path} cannot be swept: it is a table of times"):
+        case.sweep({path: ["1 pN", "2 pN"]})
+
+
 def test_a_case_without_a_sweep(bonding):
     with pytest.raises(InputError, match=r"a sweep needs `sweep: {over: ...}` in the case"):
         bonding.sweep()

@@ -105,7 +105,9 @@ def test_a_spectator_keeps_its_coverage(tmp_path):
         ("dna-adhesive", (), "nothing is made in a neighbour: name the rates that matter"),
         ("dna-adhesive", ("R_R2",), "the case has no quantity 'R_R2'. Did you mean 'R_R1'"),
         ("dna-adhesive", ("R_R1",), "R_R1 is zero at rest, so nothing controls it"),
-        ("stick-slip", ("p",), "changes in time"),
+        ("stick-slip", ("p",), r"stick-slip.yaml:\d+: .* changes in time"),
+        ("slow-passage", (), r"slow-passage.yaml:\d+: .* has jumps \(touch, release\), so that"),
+        ("catch-bond", (), r"catch-bond.yaml:1: nothing is made .* `--of R_two_pathway`"),
     ],
 )
 def test_what_has_no_steady_state(case, of, message):
