@@ -94,6 +94,16 @@ def test_laws_that_read_a_load_share_what_they_break_however_fast_they_are():
     assert (heats["heat_bell"], heats["heat_bell_2"]) == pytest.approx((-1 / 3, -2 / 3), rel=1e-9)
 
 
+@pytest.mark.parametrize("rate", ["1 nN/s", "100 nN/s"])
+def test_two_bound_states_keep_their_sites_far_beyond_their_rupture(rate):
+    """What is left of one is let go, and turned into the other, at rates that have no number."""
+    run = surfacechem.run("vinculin-catch-bond", {"loading.f": {"ramp": {"rate": rate}}, "run": {"until": "1 s"}})
+    assert run.status == "finished"
+    assert run.accuracy.error < 1e-10
+    assert run.audit.site_error < 1e-8
+    assert run.dataset["theta_free_s"].values[-1] == pytest.approx(1, rel=1e-14)
+
+
 def test_logarithms_change_nothing_else():
     potentials = [LatticeGas(epsilon=2e-20), BondSprings(k_b=1e-3)]
     scene = isothermal(ReversibleBell(k_off=1.0, x_off=X), {"g_n": Ramp(rate=1e-9)}, 0.7, potentials=potentials)

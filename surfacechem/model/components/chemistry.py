@@ -127,8 +127,7 @@ def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
     """Return the reactions with their net rates as named quantities."""
     laws = {item.label: item.law for item in found if item.law.envelope is None}
     stated = {item.label: _rate(build, item.law, item.affinity) for item in found if item.label in laws}
-    loaded = _loaded(build, stated)
-    rates = stated | {label: _resolved(build, laws, stated, label, loaded) for label in stated if label in loaded}
+    rates = stated | _resolved(build, laws, stated)
     forming = symengine.Add(*(law.stoichiometry().get("phi", 0) * rates[label] for label, law in laws.items()))
     # One while the bonding state may change; zero at a bound and while debonded. Laws without an envelope could carry
     # it over a bound; a law with an envelope ends there.
@@ -188,37 +187,57 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     return rate
 
 
-def _resolved(
-    build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], label: str, loaded: set[str]
-) -> Expression:
-    """Limit a rate whose exponents read a load, in both directions alike, to the fastest relaxation that time resolves.
+def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression]) -> dict[str, Expression]:
+    """Return the rates whose exponents read a load, each limited to the fastest relaxation that time resolves.
 
-    It then still relaxes at once, and far faster than all other reactions of the same species, so that the partition of
-    the species between reactions does not depend on the limit. Reactions that read loads and change the same species
-    are limited together, by one factor.
+    It then still relaxes at once, and far faster than other reactions that take the same species, so that the partition
+    of the species between reactions does not depend on the limit. Both directions are limited alike: reactions that
+    read loads and change the same species by one factor, so that their equilibrium stays.
     """
-    rate, own = rates[label], laws[label].stoichiometry()
-    relaxation = _relaxation(build, own, laws[label], rate)
-    if relaxation == 0:
-        return rate
-    others = {name: absolute(_relaxation(build, own, laws[name], rates[name])) for name in laws if name != label}
-    alike = {name for name in others if name in loaded and laws[name].stoichiometry().keys() == own.keys()}
-    fast = relaxation + sum(others[name] for name in alike)
-    slow = sum(others[name] for name in others if name not in alike)
+    loaded, limited = _loaded(build, rates), {}
+    changed = {label: laws[label].stoichiometry().keys() for label in loaded}
+    alike = {label: [name for name in loaded if changed[name] == changed[label]] for label in loaded}
+    steps = {label: _steps(build, laws, rates, label, alike) for label in loaded}
+    for label in loaded:
+        most: Expression = symengine.Integer(1)
+        for name in alike[label]:
+            most = where(steps[name] > most, steps[name], most)
+        limited[label] = rates[label] / most
+    return limited
+
+
+def _steps(
+    build: Build,
+    laws: Mapping[str, RateLaw],
+    rates: Mapping[str, Expression],
+    label: str,
+    alike: Mapping[str, Sequence[str]],
+) -> Expression:
+    """Return the relaxations of what a reaction takes in the least time that is resolved beside other reactions that
+    take it; of these, one that is limited itself counts by its limit.
+    """
+    taken = [name for name in laws[label].stoichiometry() if depends(rates[label], build.bonding[name].symbol)]
+    fast = _relaxation(build, taken, laws[label], rates[label])
+    if fast == 0:
+        return fast
+    rest = [name for name in laws if name not in alike[label]]
+    others = {name: absolute(_relaxation(build, taken, laws[name], rates[name])) for name in rest}
+    slow = sum(others[name] for name in others if name not in alike) * (build.t / RUPTURE_FACTOR)
+    for name in filter(alike.__contains__, others):
+        own = others[name] * (build.t / RUPTURE_FACTOR)
+        slow += where(own > 1 / TIME_EPS, 1 / TIME_EPS, own)
     quantity = Quantity(f"steps_{label}", "1", f"relaxations of {laws[label].title} in the least time that is resolved")
-    steps = fast * (build.t * TIME_EPS / RUPTURE_FACTOR) / (1 + slow * (build.t / RUPTURE_FACTOR))
-    named = build.name(quantity, steps, output=False)
-    return rate * where(named > 1, 1 / named, 1)
+    return build.name(quantity, fast * (build.t * TIME_EPS / RUPTURE_FACTOR) / (1 + slow), output=False)
 
 
-def _loaded(build: Build, rates: Mapping[str, Expression]) -> set[str]:
+def _loaded(build: Build, rates: Mapping[str, Expression]) -> list[str]:
     """Return the labels of rates whose exponents read a load, other than one that bonds share: these rupture first,
     which ends the run.
     """
     if any(role.by == SHARED_LOAD and build.variables.was_read(role.variable) for role in build.variables.roles):
-        return set()
+        return []
     loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
-    return {label for label, rate in rates.items() if any(loads & item.free_symbols for item in exponents(rate))}
+    return [label for label, rate in rates.items() if any(loads & item.free_symbols for item in exponents(rate))]
 
 
 def _relaxation(build: Build, names: Iterable[str], law: RateLaw, rate: Expression) -> Expression:
