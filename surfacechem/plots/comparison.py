@@ -101,13 +101,8 @@ def labels(datasets: Sequence[Data]) -> list[str]:
         names = _short(paths)
         texts = [", ".join(f"{name} = {each.get(path, 'not given')}" for path, name in names.items()) for each in known]
     # Datasets that still have the same name are named by their files.
-    files = [_file_name(dataset, f"dataset {k}") for k, dataset in enumerate(datasets, 1)]
+    files = [Path(dataset.file).stem or f"dataset {k}" for k, dataset in enumerate(datasets, 1)]
     return [text if texts.count(text) == 1 else file for text, file in zip(texts, files, strict=True)]
-
-
-def _file_name(dataset: Data, default: str) -> str:
-    """Return the name of the file of a dataset without its suffix."""
-    return Path(dataset.file).stem or default
 
 
 def _short(paths: Sequence[str]) -> dict[str, str]:

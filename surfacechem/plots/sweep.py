@@ -53,7 +53,7 @@ SEEN_PART = 0.99
 
 def figure_of_members(dataset: Data, plan: Plan, axes: Sequence[str], variables: Sequence[str] | None = None) -> Figure:
     """Draw a grid of two parameters, a sample, or a grid of more parameters."""
-    dataset = with_final_bonds(dataset, axes)
+    dataset = with_final_values(dataset, axes)
     known = number_names(dataset, axes)
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
     names = list(dict.fromkeys(variables or ())) or varying_numbers(dataset, axes, known)
@@ -85,16 +85,12 @@ def varying_numbers(dataset: Data, axes: Sequence[str], known: Sequence[str]) ->
     return next(filter(None, groups), ["time_reached"])[:MOST_PANELS]
 
 
-def with_final_bonds(dataset: Data, axes: Sequence[str]) -> Data:
-    """Return the dataset with bonds at the end of each run; with all final values if neither bonds nor temperatures
-    vary. It is unchanged if it holds such numbers already.
-    """
+def with_final_values(dataset: Data, axes: Sequence[str]) -> Data:
+    """Return a dataset of series with the values at the end of each run, if it does not hold any."""
     series = [name for name in series_names(dataset, axes) if name not in dataset.coords]
-    if not series or any(name.endswith("_last") for name in dataset):
+    if any(name.endswith("_last") for name in dataset):
         return dataset
-    temperatures, bonds = (of_kind(dataset, series, *kind) for _, *kind in PANELS[:2])
-    moving = [name for name in (*bonds, *temperatures) if varies(subsample(dataset, name))]
-    last = [name for name in series if not name.endswith(("_exact", "_residual"))] if not moving else bonds
+    last = [name for name in series if not name.endswith(("_exact", "_residual"))]
     final = (DataVariable(f"{n}_last", tuple(axes), final_values(dataset, n), dataset[n].attrs) for n in last)
     return replace(dataset, variables={**dataset.variables, **{each.name: each for each in final}})
 

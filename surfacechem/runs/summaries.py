@@ -362,10 +362,9 @@ def _state_rows(system: System, scene: Scene) -> list[tuple[str, ...]]:
         rows.append((s.name, f"[{s.quantity.unit}]", kind, f"{start} {s.initial:g}", s.quantity.long_name))
     asked = {body.name: body.conduction.accuracy for body in scene.bodies if body.conduction}
     for p in system.profiles:
-        start = f"from {starts[p.states[0]]:g}" if p.states else ""
+        start, accuracy = f"from {starts[p.states[0]]:g}" if p.states else "", asked[p.body]
         # For an accuracy a run finds their number.
-        number = f"as many cells as an accuracy of {asked[p.body]:g} takes" if asked[p.body] else ""
-        cells = number or f"{len(p.points) - 1} cells"
+        cells = f"as many cells as an accuracy of {accuracy:g} takes" if accuracy else f"{len(p.points) - 1} cells"
         rows.append((p.name, "[K]", "evolved", start, f"temperatures across {p.body}, in {cells}"))
     return rows
 
