@@ -18,6 +18,7 @@ from surfacechem.format import load_text
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.factors import Power
 from surfacechem.laws.loading import Hold, Ramp
+from surfacechem.laws.longrange import LennardJonesFlatFlat
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
 from surfacechem.solve.equilibria import come_to_rest
@@ -147,6 +148,16 @@ def test_a_dead_load_in_shear_beyond_the_strength_has_no_equilibrium():
     trajectory = solved.solve(together([ZONE], (), {"g_n": Hold(level=0.0), "F_t": Ramp(rate=strength / 10)}), 40.0)
     assert trajectory.status == "stopped"
     assert trajectory.result.t == pytest.approx(10.0, rel=1e-9)
+
+
+def test_a_dead_load_beside_a_repulsive_wall_opens_the_gap_up_to_the_strength():
+    flats, g_0 = {"n_1": 2e19, "n_2": 2e19, "psi_0": 4e-21}, 3e-10
+    strength = 2 * math.sqrt(5) / 9 * 2 * math.pi * math.prod(flats.values()) * g_0
+    law = LennardJonesFlatFlat(**flats, g_0=g_0)
+    load = Ramp(start=-strength / 10, rate=strength / 10)
+    trajectory = solved.solve(together([law], (), {"F_n": load}, initial={"g_n": 2e-10}), 40.0)
+    assert trajectory.status == "stopped"
+    assert trajectory.result.t == pytest.approx(11.0, rel=1e-9)
 
 
 # -- folds at which opening and shear are lost together: the gaps end where damped motion from there does -------------

@@ -129,9 +129,10 @@ def _size(build: Build, gap: Equilibrium, own: Expression) -> Expression:
     # The secant of the potential only: friction in parallel has no stiffness.
     t = build.expanded(derivative(build.psi, g))
     t = t if t != 0 else far.F - build.expanded(gap.residual)
-    # From the traction at zero gap, where attraction is not zero; if that is singular, from zero traction.
+    # From the traction at zero gap, where attraction is not zero, or from zero traction, where repulsion has a wall.
     closed = t.subs(g, 0)
-    secant = (t if closed.has(symengine.nan, symengine.zoo, symengine.oo) else t - closed) * g
+    rise = t if closed.has(symengine.nan, symengine.zoo, symengine.oo) else t - closed
+    secant = where(absolute(t) < absolute(rise), t, rise) * g
     return where(secant > 0, secant / absolute(g) ** 2, where(absolute(own) > 0, absolute(own), 1))
 
 
