@@ -19,7 +19,7 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-from surfacechem.errors import InputError, Place, refuse_unknown, suggestion
+from surfacechem.errors import InputError, Place, nearest, refuse_unknown, suggestion
 
 # Largest depth of nested mappings and lists.
 MOST_NESTED = 24
@@ -182,7 +182,8 @@ def named(tree: Tree, base: str | Path, what: str) -> Path:
     name = tree.text(what)
     path = file_in(Path(base), name, tree.place)
     if path is None:
-        raise tree.error(f"no file {name} beside the case.")
+        like = nearest(name, [other.name for other in Path(base).glob(f"*{Path(name).suffix}")])
+        raise tree.error(f"no file {name} beside the case.{like}")
     return path
 
 
@@ -399,7 +400,7 @@ def overridden(tree: Tree, overrides: str | Sequence[str] | Mapping[str, object]
     return with_paths(tree)
 
 
-def assignments(texts: Sequence[str]) -> dict[str, object]:
+def assignments(texts: str | Sequence[str] | Mapping[str, object]) -> dict[str, object]:
     """Return texts "path=value" as plain values; InputError if a path is given twice.
 
     >>> assignments(["f=3 pN", "g=[1, 2]"])

@@ -98,7 +98,8 @@ class CSVText:
         if None in found:
             column = found.index(None)
             which = f"'{cells[column]}'" if quoted else f"of column {column + 1}"
-            raise self.error(line, f"the heading {which} is no name with a unit, like w_n [um] or phi [1].")
+            apart = " Columns are separated by commas." if ";" in cells[column] or "\t" in cells[column] else ""
+            raise self.error(line, f"the heading {which} is no name with a unit, like w_n [um] or phi [1].{apart}")
         return [(match["name"], (match["unit"] or "").strip()) for match in found if match]
 
     def error(self, line: int, message: str) -> InputError:

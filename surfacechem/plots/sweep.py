@@ -56,7 +56,8 @@ def figure_of_members(dataset: Data, plan: Plan, axes: Sequence[str], variables:
     dataset = with_final_values(dataset, axes)
     known = number_names(dataset, axes)
     refuse_unknown(variables or (), known, "no variable '{}' in the sweep", style.place_of(dataset))
-    names = list(dict.fromkeys(variables or ())) or varying_numbers(dataset, axes, known)
+    ruptures = [f"{load}_{which}" for load in filter(None, [load_of(dataset)]) for which in STATISTICS]
+    names = list(dict.fromkeys(variables or ruptures)) or varying_numbers(dataset, axes, known)
     if len(dataset[names[0]].dims) > len(axes):
         return curves(dataset, axes, names)
     if len(axes) == 2 and RUN_DIMENSION not in axes:
@@ -177,7 +178,7 @@ def curves(dataset: Data, axes: Sequence[str], names: Sequence[str], against: st
             error = style.error_of(dataset, [name])
             style.label(ax.yaxis, style.quantity_words(dataset[name]), unit(dataset[name]), values, error=error)
             style.legend(ax)
-        style.label(grid[-1, 0].xaxis, "Time" if against in (None, "time") else symbol(against), unit(over), x)
+        style.label(grid[-1, 0].xaxis, {"time": "Time"}.get(over.name, symbol(over.name)), unit(over), x)
         many = RUN_DIMENSION not in axes and count > style.MOST_CURVES
         if many:
             bar = plot.colorbar(colours(dataset, axes), ax=grid[:, 0].tolist())
@@ -510,17 +511,15 @@ def plan_of(dataset: Data) -> Plan:
     axes = axes_of(dataset)
     style.check_variables(dataset, {}, {"status": tuple(axes)})
     plan = recorded_plan(dataset.attrs["sweep"])
-    known = all(name in dataset.coords for name in axes) and 1 <= len(axes) <= MOST_DRAWN
-    if not known and not hides_runs(dataset, axes):
+    if not axes or not (hides_runs(dataset, axes) or {*axes} <= {*dataset.coords}):
         raise InputError("the dataset does not hold the parameters of a sweep.")
     return plan
 
 
 def hides_runs(dataset: Data, axes: Sequence[str]) -> bool:
     """True if curves over the first parameter, one for each value of a second one, cannot show the runs."""
-    spectral = any(name.endswith("_mode") for name in dataset)
-    curves = len(axes) == MOST_DRAWN and dataset.sizes[axes[1]] > MOST_CURVES
-    return not spectral and (RUN_DIMENSION in axes or len(axes) > MOST_DRAWN or curves)
+    many = len(axes) == MOST_DRAWN and dataset.sizes[axes[1]] > MOST_CURVES and not load_of(dataset)
+    return RUN_DIMENSION in axes or len(axes) > MOST_DRAWN or many
 
 
 def axes_of(dataset: Data) -> list[str]:

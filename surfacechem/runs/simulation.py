@@ -96,7 +96,7 @@ def run(source: Source, overrides: Overrides = ()) -> Solution:
 def sweep(
     source: Source,
     over: Mapping[str, object] | None = None,
-    until: Mapping[str, object] | None = None,
+    until: Mapping[str, object] | str | None = None,
     overrides: Overrides = (),
 ) -> SweepSolution:
     """Read a case and run its sweep, or the given one.
@@ -427,7 +427,7 @@ class Simulation:
     def sweep(
         self,
         over: Mapping[str, object] | None = None,
-        until: Mapping[str, object] | None = None,
+        until: Mapping[str, object] | str | None = None,
         changes: Overrides | None = None,
         threads: int | None = None,
         sample: Mapping[str, object] | None = None,
@@ -443,7 +443,7 @@ class Simulation:
         over
             Lists of values, or ranges {from, to, points, spacing}, by path: numbers in SI or texts with a unit.
         until
-            A prescribed ramp, and the value of it at which each run ends.
+            A prescribed ramp, and the value of it at which each run ends: ``{"f": "200 pN"}`` or ``"f=200 pN"``.
         changes
             Values that differ from the case, by path, in SI or with a unit, the same for all runs.
         threads
@@ -550,7 +550,7 @@ class Simulation:
     def plan(
         self,
         over: Mapping[str, object] | None = None,
-        until: Mapping[str, object] | None = None,
+        until: Mapping[str, object] | str | None = None,
         sample: Mapping[str, object] | None = None,
         combine: str | None = None,
     ) -> Plan:
@@ -582,7 +582,8 @@ class Simulation:
         if section is None:
             message = "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over."
             raise InputError(message, path="sweep")
-        ends = None if until is None else read_until(from_plain(dict(until), Place(OVERRIDE, path="sweep.until")))
+        place = Place(OVERRIDE, path="sweep.until")
+        ends = read_until(from_plain(assignments(until), place)) if until is not None else None
         tables = [f"loading.{name}" for name, load in self.case.scene.loading.items() if isinstance(load, Table)]
         return plan_of(section, self.units, ends, arrays, tables)
 

@@ -80,6 +80,7 @@ def test_editors_know_both_ways(table):
     ("content", "message"),
     [
         ("t [s], Q_1 [W/m^2]\n0, 0\n1, x\n", r"heat.csv:3: Q_1 is no number there"),
+        ("t [s]; Q_1 [W/m^2]\n0; 0\n1; 1,5\n", r"heat.csv:1: the heading .* Columns are separated by commas"),
         ("t [s], Q_1 [K]\n0, 0\n1, 1\n", r"heat.csv:2: 0 K is a temperature; Q_1 needs"),
         ("t, Q_1 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: the heading 't' needs a unit: t \[s\]"),
         ("t s, Q_1 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: the heading of column 1 is no name with a unit, like"),
@@ -112,7 +113,8 @@ def test_a_table_in_the_case_has_its_lines():
 
 
 def test_a_missing_file(tmp_path):
-    with pytest.raises(InputError, match=r"loading.Q_1.table.file: no file heat.csv beside the case"):
+    (tmp_path / "heats.csv").touch()
+    with pytest.raises(InputError, match=r"Q_1.table.file: no file heat.csv beside the case. Did you mean 'heats.csv'"):
         cases.load_text(CASE, base=tmp_path)
     with pytest.raises(InputError, match="two roles: give `file` or `csv`"):
         cases.load_text(CASE.replace("heat.csv", 'heat.csv, csv: "t [s]"'), base=tmp_path)

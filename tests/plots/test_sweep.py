@@ -375,6 +375,16 @@ def test_each_distribution_is_seen_where_peaks_differ_much_or_bonds_break_at_onc
     assert all(np.nanargmax(line.get_ydata()) > 0 for line in density.get_lines())
 
 
+def test_ruptures_of_a_sample_are_distributions_and_their_survival_is_over_the_load():
+    of = {"interface.bonding.bell.k_off": {"lognormal": {"median": 0.1, "sigma": 0.5}}}
+    case = surfacechem.load("force-spectroscopy", {"sweep": {"sample": {"of": of, "runs": 16}, "until": {"f": 2e-10}}})
+    data = case.sweep().dataset
+    plot = plots.figure(data)
+    assert [ax.get_ylabel().split("{")[2][:4] for ax in plot.axes[::2]] == ["mode", "medi", "mean"]
+    assert plot.axes[0].lines[1].get_ydata()[0] == np.median(data["f_mode"])
+    assert plots.figure(data, ["survival"]).axes[0].get_xlabel() == "$f$ [pN]"
+
+
 def test_a_second_parameter_has_colours_and_statistics_have_markers():
     over = {"loading.f.ramp.rate": [1e-11, 1e-10, 1e-9], "interface.bonding.bell.k_off": [0.1, 1.0]}
     forces, *_ = plots.figure(surfacechem.sweep("force-spectroscopy", over, {"f": "150 pN"}).dataset).axes

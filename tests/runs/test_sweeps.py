@@ -83,7 +83,7 @@ def test_lifetimes_over_the_force_meet_the_exact_rates():
     np.testing.assert_allclose(data["lifetime_exact"], data["lifetime"], rtol=1e-11)
     assert data.attrs["error"] < 1e-11
     assert data.attrs["error_source"] == "exact solution bell-constant-force"
-    catch = surfacechem.load("catch-bond", {"run.until": "1 min"}).sweep(until={"survival": 1e-12}).dataset
+    catch = surfacechem.load("catch-bond", {"run.until": "1 min"}).sweep(until="survival=1e-12").dataset
     rates = [k * np.exp(catch["loading_f"] * x / (1.380649e-23 * 298.15)) for k, x in ((20.0, -8e-10), (0.2, 2e-10))]
     np.testing.assert_allclose(catch["lifetime"], 1 / sum(rates), rtol=1e-11)
 
