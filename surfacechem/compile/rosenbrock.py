@@ -10,6 +10,7 @@ variables of Hairer & Wanner, Solving Ordinary Differential Equations II, sectio
 
 import json
 from collections.abc import Collection, Iterable
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from llvmlite import ir
 
 from surfacechem.compile import PREPARATION
 from surfacechem.compile.objectcode import engine
-from surfacechem.compile.vectors import LaneFunction, by_vector, entry, function_body, number, object_code
+from surfacechem.compile.vectors import LANES, LaneFunction, by_vector, entry, function_body, number, object_code
 from surfacechem.tolerances import EPS, LINEAR_RTOL
 
 _GIVEN = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
@@ -36,6 +37,8 @@ MOST_NONZEROS = 2**8
 """Number of nonzero derivatives, as of 16 states that all depend on each other, up to which the code of a step is made
 in about a second; it grows with the products of an elimination.
 """
+UNEQUAL = 1.0, -2.0, 3.0, -1.0, 2.0, -3.0
+"""Changes of states, in units of their weights: unequal, so that those of two states do not cancel in a difference."""
 MOST_LOST = 0.1 * LINEAR_RTOL / EPS
 """Factor by which terms may exceed what is left of them: their roundoff is then a tenth of the tolerance."""
 
@@ -120,6 +123,7 @@ class _Step:
         increments: list[list[Any]] = []
         for stage in range(STAGES):
             rates = self._load(self.out, 0, n) if stage == 0 else self._rates(NODES[stage], CHANGES[stage], increments)
+            before = list(rates)
             for m in range(n):
                 earlier = [each[m] for each in increments]
                 coupled = self._sum(number(0.0), _COUPLINGS[stage], earlier)
@@ -127,12 +131,44 @@ class _Step:
                 if n * n + m in self.nonzeros and _TIME_PARTS[stage]:
                     part = b.fmul(number(_TIME_PARTS[stage]), self.h)
                     rates[m] = by_vector(b, "fmuladd", part, slopes[n * n + m], rates[m])
+            open_by = list(rates)
             self._solve(rates)
             increments.append(rates)
             self._store(self.out, (1 + stage) * n, rates)
-        self._rates(1.0, [*CHANGES[-1], 1.0], increments)
+        after = self._rates(1.0, [*CHANGES[-1], 1.0], increments)
         self._store(self.out, self.end + n, self._load(self.inputs, 1, n))
+        self._store_errors(increments[-1], open_by, [b.fsub(*each) for each in zip(after, before, strict=True)], after)
         b.ret_void()
+
+    def _store_errors(self, last: list[Any], open_by: list[Any], changes: list[Any], after: list[Any]) -> None:
+        """Replace the errors of the states, the last increments, where an equation has become so much softer than the
+        matrix that these are small and close no gap: what it is open by is then the error of its rate.
+
+        Given are what the equations were open by before the last increments, the changes of the rates by these, and
+        the rates at the end. A gap is no error if states that move by their weights change the rate by more.
+        """
+        b, norm, soft, left = self.builder, number(0.0), [], []
+        unit = b.fmul(number(GAMMA), self.h)
+        for increment, weight in zip(last, self.units, strict=True):
+            size = b.fdiv(self._size(increment), weight)
+            norm = b.select(b.fcmp_ordered(">", size, norm), size, norm)
+        for increment, before, change, weight in zip(last, open_by, changes, self.units, strict=True):
+            closed = b.fsub(b.fdiv(increment, unit), change)
+            left.append(b.fsub(before, closed))
+            # Increments of norm one, the tolerance, would close so much more.
+            stays = b.fcmp_ordered(">", b.fmul(norm, self._size(left[-1])), self._size(closed))
+            soft.append(b.and_(stays, b.fcmp_ordered(">", b.fmul(self._size(left[-1]), unit), weight)))
+        bits = ir.IntType(LANES)
+        found = b.icmp_unsigned("!=", b.bitcast(reduce(b.or_, soft), bits), bits(0))
+        with b.if_then(found, likely=False):
+            # Where roundoff exceeds the increments, they close nothing even of a stiff equation.
+            moves = [b.fmul(number(UNEQUAL[m % len(UNEQUAL)]), weight) for m, weight in enumerate(self.units)]
+            self._store(self.inputs, 1, map(b.fadd, self._load(self.inputs, 1, self.n), moves))
+            moved = self._call(self.states, STAGES * self.n)
+            for m, increment in enumerate(last):
+                unexplained = b.fcmp_ordered(">", self._size(left[m]), self._size(b.fsub(moved[m], after[m])))
+                error = b.select(b.and_(soft[m], unexplained), b.fmul(left[m], unit), increment)
+                self._store(self.out, STAGES * self.n + m, [error])
 
     def _rates(self, node: float, factors: list[float], increments: list[list[Any]]) -> list[Any]:
         """Evaluate the rates at a fraction of the step, where these factors of the increments are the change."""

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 import symengine as se
 from sampling import every
-from solver_problems import exothermic_problem, problem, robertson_sums
+from scipy.special import exp1
+from solver_problems import DY, T, Y, exothermic_problem, problem, robertson_sums
 
 import surfacechem
 from surfacechem.compile.program import compile_program
@@ -206,6 +207,39 @@ def test_robertson(rtol, left):
     assert left[0] == 0
     exact = np.array([2.083340149701255e-08, 8.333360770334713e-14])  # Hairer & Wanner II, IV.10
     assert np.max(np.abs(found.ends[::3, 1:3] / exact - 1)) < 10 * rtol
+
+
+def alike(program, start, given, end, rtol, method, **options):
+    """Eight equal runs by one method; what they end with."""
+    shared = problem(program, start, [0.0, end], rtol, parameters=given, **options, **dict.fromkeys(method, True))
+    columns = np.tile(shared.y0, (8, 1)), np.tile(shared.parameters, (8, 1, 1)), np.array([shared.spacing])
+    solve = lane_batch.solve_batch if method else solve_arrays
+    found = solve(shared, *columns, np.zeros((1, 0)), shared.segments[None], np.zeros((1, 0)))
+    assert not np.any(found.counts[:, END])
+    return found.ends[:, 1 : 1 + program.n]
+
+
+@pytest.mark.parametrize("method", [(), ("explicit",), ("implicit_lanes",)])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-9])
+def test_growth_from_less_than_the_least_divisor(rtol, method):
+    program = compile_program(T, [Y], [DY], [], [DY - Y * (1 - Y)])
+    found = alike(program, [1e-299], [], 600.0, rtol, method, atol=0.0)
+    assert found == pytest.approx(1 / (1 + 1e299 * np.exp(-600.0)), rel=100 * rtol, abs=0)
+
+
+STIFF = [4, 8, 12, 20, 30, 100]
+FREEZING = [(k, s, rtol) for k in STIFF for s in (1, 6) for rtol in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10)]
+
+
+@pytest.mark.parametrize("method", [(), ("implicit_lanes",)])
+@pytest.mark.parametrize(("stiff", "soft", "rtol"), every(5, FREEZING))
+def test_what_becomes_slow_within_a_step_lags(stiff, soft, rtol, method):
+    """Led by t at rates that fall exponentially by decades, y stays behind when they are slow."""
+    fall, rate = np.log(10.0) * (stiff + soft), 10.0**stiff
+    program = compile_program(T, [Y], [DY], [], [DY + rate * se.exp(-fall * T) * (Y - T)])
+    slowest = 10.0**-soft / fall
+    lag = np.exp(slowest) * exp1(slowest) / fall
+    assert alike(program, [0.0], [], 1.0, rtol, method) == pytest.approx(1 - lag, rel=10 * rtol)
 
 
 @cache

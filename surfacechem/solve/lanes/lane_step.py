@@ -32,7 +32,7 @@ from surfacechem.solve.radau.dense import FORESEEN_PART, N_GROUPS, ledger_rtol
 from surfacechem.solve.radau.explicit import DENSEST
 from surfacechem.solve.radau.step import CHECK_PART, END_CHECKS, MAX_DEFECT, MAX_GROWTH, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.work import RATES, compiled, evaluate, evaluate_at, weighted_sums
-from surfacechem.tolerances import LOOSE_RTOL, RUN_EPS, TINY
+from surfacechem.tolerances import LEAST_WEIGHT, LOOSE_RTOL, RUN_EPS, TINY
 
 END_STAGE = tables.STAGES_OF_DENSE - 1
 """The last stage, at the end of the step."""
@@ -96,7 +96,7 @@ def put_moved(w: Any, passed: Any, changes: Any, factor: Any) -> None:
 def set_weights(w: Any) -> None:
     """Set the weights of the error norm at the start of the step."""
     for m in range(w.n):
-        put(w.weight[m], larger(w.rtol * absolute(lanes(w.y[m])) + w.atol[m], TINY))
+        put(w.weight[m], larger(w.rtol * absolute(lanes(w.y[m])) + w.atol[m], LEAST_WEIGHT))
 
 
 @compiled
@@ -115,7 +115,7 @@ def error_norm(w: Any, errors: Any) -> Any:
     norm = same(0.0)
     for m in range(w.n):
         largest = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        size = absolute(lanes(errors[m])) / larger(w.rtol * largest + w.atol[m], TINY)
+        size = absolute(lanes(errors[m])) / larger(w.rtol * largest + w.atol[m], LEAST_WEIGHT)
         norm = where(size <= norm, norm, size)  # not larger(): NaN must be seen
     return norm
 
@@ -183,10 +183,10 @@ def try_step(w: Any) -> None:
         blank = blank + 0.0 * lanes(w.coarse[m])  # NaN where an error is NaN, which comparisons would lose
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        rate = h / larger(w.rtol * size + w.atol[m], TINY)
-        error = absolute(lanes(w.coarse[m])) * rate
+        unit = 1.0 / larger(w.rtol * size + w.atol[m], LEAST_WEIGHT)
+        error = absolute(h * lanes(w.coarse[m])) * unit
         largest = where(error <= largest, largest, error)
-        second = larger(second, absolute(lanes(w.fine[m])) * rate)
+        second = larger(second, absolute(h * lanes(w.fine[m])) * unit)
     # The estimate of fifth order, made one of seventh by that of third.
     norm = largest * largest / (explicit.ERROR_PART * square_root(largest * largest + 0.01 * second * second + TINY))
     put(w.norm, blank + (larger(norm, _ledger_norms(w)) if w.n_ledger > 0 else norm))
@@ -274,7 +274,10 @@ def prepare_checks(w: Any) -> None:
     h = lanes(w.h)
     for m in range(w.n):
         size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        put(w.allowed[m], MAX_DEFECT * tables.GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], TINY) / h)
+        put(
+            w.allowed[m],
+            MAX_DEFECT * tables.GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], LEAST_WEIGHT) / h,
+        )
     for m in range(w.n_ledger):
         put(w.allowed[w.n + m], same(np.inf))  # an account without a group only has to be finite
     for group in range(N_GROUPS):

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from surfacechem.compile.rosenbrock import UNEQUAL
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes.lane_run import loop_of
 from surfacechem.solve.lanes.lane_step import (
@@ -54,7 +55,7 @@ from surfacechem.solve.radau.linear import PIVOT_PART
 from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
 from surfacechem.solve.radau.step import CONTRACTING, LEAST_CONVERGENT, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.work import JACOBIAN, RATES, RESIDUAL, compiled, evaluate, evaluate_at, weighted_sums
-from surfacechem.tolerances import EPS, NEGLIGIBLE, TINY
+from surfacechem.tolerances import EPS, NEGLIGIBLE, NEWTON_EPS, TINY
 
 MEMBER, STAGES = 1, 5
 """Member of the family in these steps, and its number of stages."""
@@ -254,6 +255,8 @@ def _correct(w: Any, active: Any) -> Any:
         evaluate(w, RESIDUAL, w.g[i])
         for m in range(w.n):
             put(w.g[i, m], lanes(w.k[1 + i, m]) - lanes(w.g[i, m]))
+    for m in range(w.n):
+        put_where(active, w.error[m], lanes(w.g[STAGES - 1, m]))
     for i in range(STAGES):
         _to_parts(i, w.g.ctypes.data, every, every, w.parts[i].ctypes.data)
     for m in range(w.n):
@@ -275,6 +278,54 @@ def _correct(w: Any, active: Any) -> Any:
 
 
 @compiled
+def _move_states(w: Any) -> None:
+    """Move the states in the inputs by their weights."""
+    for m in range(w.n):
+        put(w.inputs[1 + m], lanes(w.inputs[1 + m]) + UNEQUAL[m % len(UNEQUAL)] * lanes(w.weight[m]))
+
+
+@compiled
+def _are_open(w: Any, residual: Any) -> Any:
+    """Mask of lanes in which an equation is open by more than a rate that moves its state by the tolerance in the step,
+    or by roundoff of its rate.
+    """
+    unit, found = tables.GAMMA[MEMBER] / lanes(w.h), same(0.0)
+    for m in range(w.n):
+        allowed = unit * lanes(w.weight[m]) + NEWTON_EPS * absolute(lanes(w.k[STAGES, m]))
+        found = where(absolute(lanes(residual[m])) > allowed, 1.0, found)
+    return found > 0.5
+
+
+@compiled
+def _are_astray(w: Any, norm: Any) -> Any:
+    """Mask of lanes in which Newton's method ends at a wrong state, because equations have become much softer than its
+    matrix: its last corrections, of this norm, are small and close no gap.
+
+    The equations at the end of the step are then open by more than states that move by their weights change them. How
+    far they were open before the last correction is in ``error``.
+    """
+    astray = _are_open(w, w.error)
+    if any_lane(astray):
+        _put_slopes(w, STAGES - 1)
+        _put_stage(w, STAGES - 1)
+        evaluate(w, RESIDUAL, w.rhs)
+        for m in range(w.n):
+            rate, before = lanes(w.rhs[m]), lanes(w.error[m])
+            left = lanes(w.k[STAGES, m]) - rate
+            put(w.imaginary[m], rate)
+            put(w.rhs[m], where(norm * absolute(left) > absolute(left - before), left, 0.0))
+        astray = astray & _are_open(w, w.rhs)
+    if any_lane(astray):
+        _move_states(w)
+        evaluate(w, RESIDUAL, w.error)
+        for m in range(w.n):
+            left, change = lanes(w.rhs[m]), absolute(lanes(w.error[m]) - lanes(w.imaginary[m]))
+            put(w.rhs[m], where(absolute(left) > change, left, 0.0))
+        astray = astray & _are_open(w, w.rhs)
+    return astray
+
+
+@compiled
 def _solve_stages(w: Any) -> Any:
     """Iterate to the tolerance in each lane; return the mask of lanes in which it is met.
 
@@ -284,9 +335,10 @@ def _solve_stages(w: Any) -> Any:
     solved = active & ~active
     fresh = ~(lanes(w.h_last) > 0.0)
     contraction = exponential(newton.TRUST * logarithm(larger(where(fresh, 1.0, lanes(w.contraction)), same(EPS))))
-    theta, last, rate_last = same(0.0), same(1.0), same(0.0)
+    theta, last, rate_last, smallest = same(0.0), same(1.0), same(0.0), same(0.0)
     for iteration in range(MOST_ITERATIONS):
         norm = _correct(w, active)
+        smallest = where(active, norm, smallest)
         put(w.evaluations, lanes(w.evaluations) + where(active, float(STAGES), 0.0))
         goes_on = norm < np.inf
         if iteration == 0:
@@ -315,7 +367,7 @@ def _solve_stages(w: Any) -> Any:
         last = larger(norm, same(TINY))
     put(w.theta, theta)
     put(w.contraction, contraction)
-    return solved
+    return solved & ~_are_astray(w, smallest)
 
 
 @compiled
@@ -366,10 +418,7 @@ def _explain(w: Any) -> None:
     """
     h = lanes(w.h)
     _put_stage(w, STAGES - 1)
-    for m in range(w.n):
-        # Unequal changes, so that the errors of two states do not cancel in their difference.
-        change = (1.0 + m % 3) * (1.0 - 2.0 * (m % 2))
-        put(w.inputs[1 + m], lanes(w.inputs[1 + m]) + change * lanes(w.weight[m]))
+    _move_states(w)
     evaluate(w, RATES, w.rates)
     for m in range(w.n, w.columns):
         put(w.change[m], h * absolute(lanes(w.rates[m]) - lanes(w.k[STAGES, m])))

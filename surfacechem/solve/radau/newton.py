@@ -20,7 +20,7 @@ from surfacechem.solve.radau.linear import (
     solve_complex,
     solve_real,
 )
-from surfacechem.solve.radau.roundoff import correction_is_noise
+from surfacechem.solve.radau.roundoff import correction_is_noise, measure_differences
 from surfacechem.solve.radau.work import (
     RESIDUAL,
     clear,
@@ -32,7 +32,7 @@ from surfacechem.solve.radau.work import (
     finite,
     put,
 )
-from surfacechem.tolerances import EPS, NEGLIGIBLE, TINY
+from surfacechem.tolerances import EPS, NEGLIGIBLE, NEWTON_EPS, TINY
 
 CONVERGED, DIVERGED, NOT_FINITE = range(3)
 
@@ -290,24 +290,29 @@ def _correct(w: Any) -> float:
 
 
 @compiled
-def _is_astray(w: Any, stages: int, h: float) -> bool:
-    """True if Newton's method ends at a wrong state, where equations are so much softer than the matrix that its
-    corrections are nothing.
+def _is_astray(w: Any, stages: int, h: float, norm: float) -> bool:
+    """True if Newton's method ends at a wrong state, because equations have become much softer than its matrix: its
+    last corrections, of this norm, are small and close no gap.
 
-    A correction far below the roundoff of the change of a state is suspect. The equations at the end of the step are
-    then open by more than all states change them within their tolerances.
+    The equations at the end of the step are then open by more than all states change them within their tolerances, and
+    by more than roundoff. What they were open by before the last correction is in ``columns``.
     """
-    suspect = False
-    for m in range(w.n):
-        moved = change = 0.0
-        for i in range(stages):
-            moved, change = max(moved, abs(w.z[i, m])), max(change, abs(w.g[i, m]))
-        suspect = suspect or (moved > w.weight[m] and change < NEGLIGIBLE * EPS * moved)
-    if not suspect:
+    if not _may_be_open(w, h, w.columns):
         return False
     set_stage(w, stages - 1, h)
     evaluate(w, RESIDUAL, w.rhs)
-    clear(w.columns)
+    w.residuals += 1
+    for i in range(w.core):
+        # Corrections of norm one, the tolerance, would close so much more.
+        if norm * abs(w.rhs[i]) <= abs(w.rhs[i] - w.columns[i]):
+            w.columns[i] = 0.0
+    if not _may_be_open(w, h, w.columns):
+        return False
+    for j in range(w.n):
+        w.trial[j], w.trial_dot[j] = w.inputs[1 + j], w.inputs[1 + w.n + j]
+    measure_differences(w, w.trial, w.trial_dot)
+    for i in range(w.core):
+        w.columns[i] = ROUNDINGS * w.differences[i]
     for j in range(w.core):
         y, ydot = w.inputs[1 + j], w.inputs[1 + w.n + j]
         w.inputs[1 + j] = y + w.weight[j]
@@ -316,11 +321,27 @@ def _is_astray(w: Any, stages: int, h: float) -> bool:
         w.inputs[1 + j], w.inputs[1 + w.n + j] = y, ydot
         for i in range(w.core):
             w.columns[i] += abs(w.delta[i] - w.rhs[i])
-    w.residuals += w.core + 1
+    w.residuals += w.core
     astray = False
     for i in range(w.core):
         astray = astray or abs(w.rhs[i]) > w.columns[i]
     return astray
+
+
+@compiled
+def _may_be_open(w: Any, h: float, residual: Any) -> bool:
+    """True if an equation is open by more than rates change it that move the states by their tolerances in the step, or
+    by roundoff of the rates.
+    """
+    unit = tables.GAMMA[w.member] / h
+    for i in range(w.core):
+        allowed = 0.0
+        for j in range(w.core):
+            rate = w.inputs[1 + w.n + j]
+            allowed += abs(w.jacobian[1, i, j]) * (unit * w.weight[j] + NEWTON_EPS * abs(rate))
+        if abs(residual[i]) > allowed:
+            return True
+    return False
 
 
 @compiled
@@ -333,14 +354,16 @@ def solve_stages(w: Any, h: float) -> int:
     limit = 7 + 2 * w.member
     contraction = max(w.contraction, EPS) ** TRUST
     k, s, rate_of_time = w.member, stage_count(w.member), 1.0 / h
-    norm_last, rate_last = 0.0, 0.0
+    norm = norm_last = rate_last = 0.0
     w.theta = 0.0
+    settled = False
     for iteration in range(limit):
         combine(tables.INVERSE[k].ctypes.data, 7, s, s, w.z.ctypes.data, w.n, w.slopes.ctypes.data)
         for i in range(s):
             put_change(w, h, tables.NODES[k, i], w.z[i], w.slopes[i], rate_of_time)
             evaluate(w, RESIDUAL, w.g[i])
         w.residuals += s
+        copy(w.g[s - 1], w.columns)
         norm = _correct(w)
         w.iterations += 1
         w.newton_steps = iteration + 1
@@ -358,13 +381,17 @@ def solve_stages(w: Any, h: float) -> int:
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
         # At loose tolerances a single correction may hide a layer that the Jacobian does not resolve.
         believed = iteration > 0 or w.rtol < tables.COARSE_RTOL
-        if (believed and contraction * norm <= NEWTON_PART) or norm <= ROUNDINGS * w.roundoff:
-            if _is_astray(w, s, h):
-                w.h_last = 0.0  # predict nothing
-                return DIVERGED
+        settled = (believed and contraction * norm <= NEWTON_PART) or norm <= ROUNDINGS * w.roundoff
+        if settled:
             w.contraction = contraction
-            return CONVERGED
+            break
         norm_last = max(norm, TINY)
-    # A stalled iteration may be at roundoff level, where the contraction means nothing.
-    w.guess_error = 0.0
-    return CONVERGED if correction_is_noise(w, s) else DIVERGED
+    if not settled:
+        # A stalled iteration may be at roundoff level, where the contraction means nothing.
+        w.guess_error = 0.0
+        if not correction_is_noise(w, s):
+            return DIVERGED
+    if _is_astray(w, s, h, norm):
+        w.h_last = 0.0  # predict nothing
+        return DIVERGED
+    return CONVERGED

@@ -25,7 +25,7 @@ MAGNIFIED = 10.0
 
 
 @compiled
-def _measure_differences(w: Any, y: Any, ydot: Any) -> None:
+def measure_differences(w: Any, y: Any, ydot: Any) -> None:
     """Take fifth differences of the equations over neighbouring times: zero for smooth equations, but not for roundoff
     of their loads.
 
@@ -73,7 +73,7 @@ def spread_noise(w: Any, y: Any, ydot: Any) -> None:
     The terms of an equation are as large as its derivatives times their variables.
     """
     n, core, column = w.n, w.core, w.delta
-    _measure_differences(w, y, ydot)
+    measure_differences(w, y, ydot)
     for j in range(n):
         w.noise[j] = ULPS * abs(y[j])
     for i in range(core if w.links == 0 else core + 1):
@@ -109,7 +109,7 @@ def _bounds_serve(w: Any) -> bool:
 
     True if their effect on the error estimate is negligible compared with the tolerance.
     """
-    _measure_differences(w, w.y, w.ydot)
+    measure_differences(w, w.y, w.ydot)
     for i in range(w.n):
         w.delta[i] = _rounding_of(w, i, w.y, w.ydot)
     bound_real(w, w.delta)
