@@ -123,6 +123,13 @@ def test_any_other_is_not(name):
     assert not told_by_check(pulled(MORE[name]))
 
 
+def test_friction_that_rises_from_rest_too_steeply_is_told():
+    texts = told_by_check(pulled(Stribeck(mu_s=0.2, mu_k=0.3, v_s=1e-3, delta=0.5)))
+    assert [text for text in texts if "rises from rest with an infinite slope" in text]
+    assert [text for text in texts if "it rises as sliding grows faster" in text]
+    assert not told_by_check(pulled(Stribeck(mu_s=0.3, mu_k=0.2, v_s=1e-3, delta=0.5)))
+
+
 def test_a_limit_that_falls_as_the_interface_heats_is_told_by_the_run():
     made = pulled(BondedCoulomb(mu=0.3, mu_b=0.31, mu_ub=0.31))
     hot = replace(made, loading=made.loading | {"Q_1": Hold(level=1e5)})

@@ -268,12 +268,16 @@ def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, 
         # A limit below kinetic friction is unphysical: it is raised to that, with a caution.
         given = {"p": ONE, **REST}  # 1 Pa stands for any pressure: coefficients are compared
         kinetic = build.variables.call(bound, bound.statement, given)
+        told = "sticking bears the latter"
         if {"mu_s", "mu_k"} <= vars(bound).keys():  # the friction of fast sliding, to which that at rest falls
-            static, kinetic = vars(bound)["mu_s"], vars(bound)["mu_k"]
+            static, kinetic, delta = (vars(bound)[name] for name in ("mu_s", "mu_k", "delta"))
+            told = "it rises as sliding grows faster"
+            steep = f"the friction of {law.title} rises from rest with an infinite slope, which no step resolves"
+            build.add(Caution(where(delta < 1, static - kinetic, ONE), f"{steep}: give a delta of 1 or more"))
         else:
             static = build.variables.call(bound, bound.limit, given)
         if static != kinetic:
-            text = f"the static friction of {law.title} is below its sliding friction: sticking bears the latter"
+            text = f"the static friction of {law.title} is below its sliding friction: {told}"
             build.add(Caution(static - kinetic, text))
     for d in sticking:
         limits, at_rest, two = build.motion.stick_limits, {**own, **REST}, d is ACROSS and bound.transverse is not None
