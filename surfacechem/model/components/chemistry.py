@@ -199,10 +199,8 @@ def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Exp
     alike = {label: [name for name in loaded if changed[name] == changed[label]] for label in loaded}
     steps = {label: _steps(build, laws, rates, label, alike) for label in loaded}
     for label in loaded:
-        most: Expression = symengine.Integer(1)
-        for name in alike[label]:
-            most = where(steps[name] > most, steps[name], most)
-        limited[label] = rates[label] / most
+        together = sum(steps[name] for name in alike[label])
+        limited[label] = rates[label] * where(together > 1, 1 / together, 1)
     return limited
 
 
