@@ -54,6 +54,9 @@ QUARTER_EPS = EPS**0.25
 LEAST_WEIGHT = float_info.min
 """Least tolerance of a state, 2e-308: its inverse times any smaller error is finite."""
 
+UNEQUAL = 1.0, -2.0, 3.0, -1.0, 2.0, -3.0
+"""Changes of states in turn, in units of their tolerances, a choice: those of two do not cancel in a difference."""
+
 NEGLIGIBLE = 1e-3
 """Fraction that changes no decision: step sizes and iterations are known to a few per cent at best."""
 

@@ -20,7 +20,7 @@ from llvmlite import ir
 from surfacechem.compile import PREPARATION
 from surfacechem.compile.objectcode import engine
 from surfacechem.compile.vectors import LANES, LaneFunction, by_vector, entry, function_body, number, object_code
-from surfacechem.tolerances import EPS, LINEAR_RTOL
+from surfacechem.tolerances import EPS, LINEAR_RTOL, UNEQUAL
 
 _GIVEN = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
 GAMMA, NODES, CHANGES, _COUPLINGS, _TIME_PARTS, _DENSE = (
@@ -37,8 +37,6 @@ MOST_NONZEROS = 2**8
 """Number of nonzero derivatives, as of 16 states that all depend on each other, up to which the code of a step is made
 in about a second; it grows with the products of an elimination.
 """
-UNEQUAL = 1.0, -2.0, 3.0, -1.0, 2.0, -3.0
-"""Changes of states, in units of their weights: unequal, so that those of two states do not cancel in a difference."""
 MOST_LOST = 0.1 * LINEAR_RTOL / EPS
 """Factor by which terms may exceed what is left of them: their roundoff is then a tenth of the tolerance."""
 

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from surfacechem.compile.rosenbrock import UNEQUAL
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes.lane_run import loop_of
 from surfacechem.solve.lanes.lane_step import (
@@ -55,7 +54,7 @@ from surfacechem.solve.radau.linear import PIVOT_PART
 from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
 from surfacechem.solve.radau.step import CONTRACTING, LEAST_CONVERGENT, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.work import JACOBIAN, RATES, RESIDUAL, compiled, evaluate, evaluate_at, weighted_sums
-from surfacechem.tolerances import EPS, NEGLIGIBLE, NEWTON_EPS, TINY
+from surfacechem.tolerances import EPS, NEGLIGIBLE, NEWTON_EPS, TINY, UNEQUAL
 
 MEMBER, STAGES = 1, 5
 """Member of the family in these steps, and its number of stages."""

@@ -14,7 +14,7 @@ import numpy as np
 from surfacechem.solve.radau import tables
 from surfacechem.solve.radau.newton import divide, put_change, set_stage, stage_count, value_and_slope
 from surfacechem.solve.radau.work import LEDGER, combine, compiled, copy, evaluate, finite, put
-from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS, TINY
+from surfacechem.tolerances import NEGLIGIBLE, RUN_EPS, TINY, UNEQUAL
 
 N_GROUPS = 3
 """Groups of accounts that share a scale: energies, entropies, bonds."""
@@ -184,9 +184,8 @@ def explained_norm(w: Any, h: float) -> float:
     """The last norm without the part that an error of the states within their tolerance causes in an account."""
     n, last = w.n, stage_count(w.member) - 1
     set_stage(w, last, h)
-    # Unequal changes, so that the errors of two states do not cancel in their difference.
     for j in range(n):
-        change = (1 + j % 3) * (1 - 2 * (j % 2)) * w.weight[j]
+        change = UNEQUAL[j % len(UNEQUAL)] * w.weight[j]
         w.inputs[1 + j] += change
         w.inputs[1 + n + j] += change / h
     evaluate(w, LEDGER, w.q_explained)
