@@ -8,7 +8,8 @@ import pytest
 from scenes import SITES, bodies, together
 from solved import solve
 
-from surfacechem.contracts.terms import Varying
+from surfacechem.contracts.terms import Friction, UnderPressure, Varying, parameter
+from surfacechem.expressions import absolute
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.free_energy import BondEnergy, LatticeGas, NormalStiffness, Penalty
@@ -116,6 +117,26 @@ def test_a_static_limit_below_sliding_friction_is_told(name):
     (text,) = told_by_check(pulled(LESS[name], T))
     assert "is below its sliding friction" in text
     assert name != "of the temperature" or text in Solution(solve(pulled(LESS[name], T), 1.0)).warnings
+
+
+class Rising(UnderPressure, Friction):
+    """Friction from mu_s to mu_k, over a velocity of 1 mm/s."""
+
+    mu_s: float = parameter("1", "friction coefficient at rest", at_least=0)
+    mu_k: float = parameter("1", "friction coefficient of fast sliding", at_least=0)
+
+    def traction(self, p, v, direction):
+        """Tangential traction [Pa]."""
+        return (self.mu_s + (self.mu_k - self.mu_s) * absolute(v) / (absolute(v) + 1e-3)) * p * direction
+
+    def limit(self, p):
+        """Largest tangential traction [Pa] that sticking bears."""
+        return self.mu_s * p
+
+
+def test_a_law_without_that_exponent_is_told_too():
+    (text,) = told_by_check(pulled(Rising(mu_s=0.2, mu_k=0.3)))
+    assert "is below its sliding friction" in text
 
 
 @pytest.mark.parametrize("name", MORE)

@@ -270,10 +270,11 @@ def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, 
         kinetic = build.variables.call(bound, bound.statement, given)
         told = "sticking bears the latter"
         if {"mu_s", "mu_k"} <= vars(bound).keys():  # the friction of fast sliding, to which that at rest falls
-            static, kinetic, delta = (vars(bound)[name] for name in ("mu_s", "mu_k", "delta"))
+            static, kinetic = vars(bound)["mu_s"], vars(bound)["mu_k"]
             told = "it rises as sliding grows faster"
-            steep = f"the friction of {law.title} rises from rest with an infinite slope, which no step resolves"
-            build.add(Caution(where(delta < 1, static - kinetic, ONE), f"{steep}: give a delta of 1 or more"))
+            if (delta := vars(bound).get("delta")) is not None:
+                steep = f"the friction of {law.title} rises from rest with an infinite slope, which no step resolves"
+                build.add(Caution(where(delta < 1, static - kinetic, ONE), f"{steep}: give a delta of 1 or more"))
         else:
             static = build.variables.call(bound, bound.limit, given)
         if static != kinetic:
