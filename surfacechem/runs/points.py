@@ -458,6 +458,7 @@ def evaluation(evaluator: Evaluator, points: Points, **origin: Any) -> PointResu
     except (TypeError, ValueError):
         raise InputError("points are values by name, such as {'T': [300, 310]}, or a table of pandas.") from None
     values, slopes, refused = evaluator.at(points)
-    ranges = {column.name: (np.nanmin(column.values), np.nanmax(column.values)) for column in values}
+    # A value that no point has, NaN at each, is in no range.
+    ranges = {x.name: (np.nanmin(x.values, initial=np.inf), np.nanmax(x.values, initial=-np.inf)) for x in values}
     warnings = extrapolations(evaluator.system, ranges)
     return PointResults(values=values, slopes=slopes, refused=refused, warnings=warnings, **origin)

@@ -194,6 +194,12 @@ def test_no_run_could_rest_at_a_point_that_is_not_admissible(name, given, reason
     assert str(found["reason"].values[1]) == reason
 
 
+def test_what_no_point_has_is_told_without_a_warning_of_numpy(recwarn):
+    found = surfacechem.load("rate-and-state-stick-slip").evaluate({"theta": 0.0})
+    assert np.isnan(found["v"].values).all()
+    assert (found.attrs["warnings"], recwarn.list) == ("none", [])
+
+
 def test_points_come_from_a_table_with_units(element, tmp_path):
     path = tmp_path / "points.csv"
     path.write_text("g_n [nm], T_c [degC], phi\n-1, 20, 0.5\n2, 30, 1\n")
