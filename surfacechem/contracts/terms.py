@@ -384,6 +384,11 @@ class Friction(Law):
     traction: ClassVar[Callable[..., Expression]]
     limit: ClassVar[Callable[..., Expression]]
     """Friction limit [Pa] of sticking; absent if a law does not stick."""
+    fast: ClassVar[Callable[..., Expression] | None] = None
+    """Dry traction [Pa] to which that at rest falls, or rises, as sliding grows faster; None if it stays."""
+    rest_exponent: ClassVar[str] = ""
+    """Parameter that is the power of the velocity with which the traction leaves that at rest: below 1 its slope there
+    is infinite. Empty if there is none."""
     drive: ClassVar[Callable[..., Expression]]
     """Measure of the traction at a velocity, an unknown that may replace the velocity; absent if not needed."""
     velocity: ClassVar[Callable[..., Expression] | None] = None

@@ -100,6 +100,7 @@ class Stribeck(UnderPressure, Friction):
     """
 
     nonnegative = ("p",)
+    rest_exponent = "delta"
 
     mu_s: float = parameter("1", "friction coefficient at rest", at_least=0)
     mu_k: float = parameter("1", "friction coefficient of fast sliding", at_least=0)
@@ -118,6 +119,10 @@ class Stribeck(UnderPressure, Friction):
     def limit(self, p: Expression) -> Expression:
         """Largest tangential traction [Pa] that sticking bears."""
         return self.mu_s * p
+
+    def fast(self, p: Expression) -> Expression:
+        """Dry traction of fast sliding [Pa]."""
+        return self.mu_k * p
 
 
 class BondedCoulomb(UnderPressure, Friction):

@@ -120,23 +120,28 @@ def test_a_static_limit_below_sliding_friction_is_told(name):
 
 
 class Rising(UnderPressure, Friction):
-    """Friction from mu_s to mu_k, over a velocity of 1 mm/s."""
+    """Friction from that at rest to that of fast sliding, over a velocity of 1 mm/s."""
 
-    mu_s: float = parameter("1", "friction coefficient at rest", at_least=0)
-    mu_k: float = parameter("1", "friction coefficient of fast sliding", at_least=0)
+    rest: float = parameter("1", "friction coefficient at rest", at_least=0)
+    swift: float = parameter("1", "friction coefficient of fast sliding", at_least=0)
 
     def traction(self, p, v, direction):
         """Tangential traction [Pa]."""
-        return (self.mu_s + (self.mu_k - self.mu_s) * absolute(v) / (absolute(v) + 1e-3)) * p * direction
+        return (self.rest + (self.swift - self.rest) * absolute(v) / (absolute(v) + 1e-3)) * p * direction
 
     def limit(self, p):
         """Largest tangential traction [Pa] that sticking bears."""
-        return self.mu_s * p
+        return self.rest * p
+
+    def fast(self, p):
+        """Dry traction of fast sliding [Pa]."""
+        return self.swift * p
 
 
-def test_a_law_without_that_exponent_is_told_too():
-    (text,) = told_by_check(pulled(Rising(mu_s=0.2, mu_k=0.3)))
-    assert "is below its sliding friction" in text
+def test_a_law_of_other_parameters_is_told_by_what_it_states():
+    (text,) = told_by_check(pulled(Rising(rest=0.2, swift=0.3)))
+    assert text.endswith("is below its sliding friction: it rises as sliding grows faster")
+    assert not told_by_check(pulled(Rising(rest=0.3, swift=0.2)))
 
 
 @pytest.mark.parametrize("name", MORE)

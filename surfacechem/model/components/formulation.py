@@ -267,16 +267,13 @@ def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, 
     if sticking and bound.has_limit:
         # A limit below kinetic friction is unphysical: it is raised to that, with a caution.
         given = {"p": ONE, **REST}  # 1 Pa stands for any pressure: coefficients are compared
-        kinetic = build.variables.call(bound, bound.statement, given)
-        told = "sticking bears the latter"
-        if {"mu_s", "mu_k"} <= vars(bound).keys():  # the friction of fast sliding, to which that at rest falls
-            static, kinetic = vars(bound)["mu_s"], vars(bound)["mu_k"]
-            told = "it rises as sliding grows faster"
-            if (delta := vars(bound).get("delta")) is not None:
-                steep = f"the friction of {law.title} rises from rest with an infinite slope, which no step resolves"
-                build.add(Caution(where(delta < 1, static - kinetic, ONE), f"{steep}: give a delta of 1 or more"))
-        else:
-            static = build.variables.call(bound, bound.limit, given)
+        static = build.variables.call(bound, bound.limit, given)
+        kinetic = build.variables.call(bound, bound.fast or bound.statement, given)
+        told = "it rises as sliding grows faster" if bound.fast else "sticking bears the latter"
+        if law.rest_exponent:
+            rise = where(getattr(bound, law.rest_exponent) < 1, static - kinetic, ONE)
+            steep = f"the friction of {law.title} rises from rest with an infinite slope, which no step resolves"
+            build.add(Caution(rise, f"{steep}: give a {law.rest_exponent} of 1 or more"))
         if static != kinetic:
             text = f"the static friction of {law.title} is below its sliding friction: {told}"
             build.add(Caution(static - kinetic, text))
