@@ -5,13 +5,15 @@ Source of the degree of rate control: Campbell (2017), ACS Catal. 7, 2770, doi 1
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from surfacechem.contracts.terms import RateLaw
 from surfacechem.errors import InputError, listed, refuse_unknown
 from surfacechem.format import Overrides, Source
 from surfacechem.model.system import System
@@ -19,18 +21,22 @@ from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.runs.at_rest import refuse_histories
 from surfacechem.runs.listing import Rows, Sheet
 from surfacechem.runs.simulation import load
-from surfacechem.scene import Interface
+from surfacechem.scene import BondingVariable, Interface
 from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Model, Run
 from surfacechem.studies.mechanism_report import null_space
-from surfacechem.tolerances import CBRT_EPS, EPS, LINE_ERROR, LOOSE_RTOL, NEGLIGIBLE, RUN_EPS, TINY
+from surfacechem.tolerances import CBRT_EPS, CONSERVED_RATE, EPS, LINE_ERROR, LOOSE_RTOL, NEGLIGIBLE, RUN_EPS, TINY
 
 LONGER_BY, MOST_ATTEMPTS = 10.0, 16
 """Factor by which the next attempt is longer if the steady state was not reached, and number of attempts."""
 
 TRACE_COVERAGE = EPS**2
 """Coverage [1] below which changes are no longer relative to the coverage: the rounding of a rounding."""
+
+LONGEST_GROWTH = -math.log(TRACE_COVERAGE)
+"""Growth, as a logarithm, by which a trace comes to cover all: a run that lasts longer has left a state at rest that is
+not stable, unless it began there without any disturbance."""
 
 
 class SteadyState(NamedTuple):
@@ -107,7 +113,10 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
             names = listed(list(dict.fromkeys(edge.name for edge in system.edges)), 4)
             message = f"the scene has jumps ({names}), so that a steady state is not the root of one set of equations."
             raise InputError(message, path="interface")
-        rest = _Rest(Model(system), case.run, _wanted(system, of), _conserved(case.scene.interface))
+        interface = case.scene.interface
+        kept = _conserved(interface.variables, interface.reactions)
+        rest = _Rest(Model(system), case.run, _wanted(system, of), kept)
+        _refuse_many(rest, interface)
         if not of:
             rest.drop_small()
         rates, held = rest.outputs(rest.x), _held(system, rest.values)
@@ -144,15 +153,31 @@ def _wanted(system: System, of: Sequence[str]) -> dict[str, int]:
     return {name: names[name] for name in wanted}
 
 
-def _conserved(interface: Interface) -> list[dict[str, float]]:
+def _conserved(coverages: Sequence[BondingVariable], reactions: Sequence[RateLaw]) -> list[dict[str, float]]:
     """Return the weights of conserved sums of coverages, by coverage: sites of each kind, a spectator species."""
-    changes = [law.stoichiometry() for law in interface.reactions]
-    coverages = {variable.name: variable.density for variable in interface.variables}
-    own = [{str(j): nu for j, change in enumerate(changes) if (nu := change.get(name))} for name in coverages]
+    changes = [law.stoichiometry() for law in reactions]
+    own = [{str(j): nu for j, change in enumerate(changes) if (nu := change.get(item.name))} for item in coverages]
     return [
-        {name: weight * density for (name, density), weight in zip(coverages.items(), weights, strict=True) if weight}
+        {item.name: weight * item.density for item, weight in zip(coverages, weights, strict=True) if weight}
         for weights in null_space(own)
     ]
+
+
+def _refuse_many(rest: _Rest, interface: Interface) -> None:
+    """Raise InputError if reactions have used up a species, and the state at rest depends on what they made of it."""
+    names = {q.name for q, x in zip(rest.quantities, rest.x.tolist(), strict=True) if x > TRACE_COVERAGE}
+    there = [coverage for coverage in interface.variables if coverage.name in names]
+    going = [
+        law
+        for law in interface.reactions
+        if not (law.one_way and {name for name, nu in law.stoichiometry().items() if nu < 0} - names)
+    ]
+    kept = [[weights.get(coverage.name, 0.0) for coverage in there] for weights in rest.conserved]
+    if len(_conserved(there, going)) > np.linalg.matrix_rank(np.reshape(kept, (-1, len(there)))):
+        ended = listed([law.label for law in interface.reactions if law not in going], 4)
+        message = f"{ended} used up what they take, and the state at rest depends on what they had made until then."
+        remedy = "Ask for the state alone, with `until: steady` under `run`."
+        raise InputError(f"{message} {remedy}", path="interface.mechanism")
 
 
 HELD_TEMPERATURE = re.compile(r"(bodies\..+|interface)\.temperature\.level|loading\.T\w*\.level")
@@ -173,7 +198,7 @@ class _Rest:
     def __init__(
         self, model: Model, run: Run, wanted: dict[str, int], conserved: Sequence[Mapping[str, float]]
     ) -> None:
-        self.model, self.values, self.wanted = model, model.values(), wanted
+        self.model, self.values, self.wanted, self.conserved = model, model.values(), wanted, conserved
         self.time = run.times[-1]
         for _ in range(MOST_ATTEMPTS):
             reached = model.solve(replace(run, times=(0.0, self.time), picture=None))
@@ -188,7 +213,8 @@ class _Rest:
             found = self._root(start := reached.result.y[self.evaluation.free])
             if found is not None and np.all(np.abs(found - start) <= NEGLIGIBLE * np.abs(found) + run.rtol):
                 self.x, self.largest = found, np.abs(reached.outputs).max(axis=0)
-                return
+                if not 0 < self._growth * self.time < LONGEST_GROWTH:
+                    return
             self.time *= LONGER_BY
         raise InputError(f"the case did not reach a steady state within {self.time / LONGER_BY:.3g} s.")
 
@@ -224,7 +250,7 @@ class _Rest:
             ends.append((self.rates(self.x), self.outputs(self.x)))
             parameters[columns] = first
         (up, out_up), (down, out_down) = ends
-        moved = self._solve(self._slopes(self.x), -(up - down) / (2 * CBRT_EPS), self.x)
+        moved = self._solve(self._slopes(self.rates, self.x), -(up - down) / (2 * CBRT_EPS), self.x)
         part = CBRT_EPS / max(float(np.max(np.abs(moved) / (np.abs(self.x) + TRACE_COVERAGE))), 1.0)
         following = (self.outputs(self.x + part * moved) - self.outputs(self.x - part * moved)) / (2 * part)
         return np.asarray((out_up - out_down) / (2 * CBRT_EPS) + following)
@@ -232,7 +258,7 @@ class _Rest:
     def _root(self, x: Array) -> Array | None:
         """Return the steady state near x by Newton's method, with the same conserved sums; None if it fails."""
         for _ in range(20):
-            step = self._solve(self._slopes(x), -self.rates(x), x)
+            step = self._solve(self._slopes(self.rates, x), -self.rates(x), x)
             x = x + step
             if not np.all(np.isfinite(x)):
                 return None
@@ -240,22 +266,37 @@ class _Rest:
                 return x
         return None
 
-    def _slopes(self, x: Array) -> Array:
-        """Return the derivatives of the rates by relative changes of the states."""
+    @property
+    def _growth(self) -> float:
+        """The rate [1/s] at which disturbances grow at the root; 0 where all decay, or none beyond rounding."""
+        rates = np.linalg.eigvals(self._slopes(self.rates, self.x) / (np.abs(self.x) + TRACE_COVERAGE)[:, None])
+        fastest = float(rates.real.max())
+        return fastest if fastest > CONSERVED_RATE * float(np.abs(rates).max()) else 0.0
+
+    def _slopes(self, of: Callable[[Array], Array], x: Array) -> Array:
+        """Return the derivatives of the rates, or of the energy, by relative changes of the states."""
         columns = []
         for j, size in enumerate(np.abs(x) + TRACE_COVERAGE):
             step = np.zeros(len(x))
             step[j] = CBRT_EPS * size
-            columns.append((self.rates(x + step) - self.rates(x - step)) / (2 * CBRT_EPS))
+            columns.append((of(x + step) - of(x - step)) / (2 * CBRT_EPS))
         return np.array(columns).T
 
+    def _energy(self, x: Array) -> Array:
+        """Return the total energy, if nothing supplies any, as one of no or one conserved quantities."""
+        system = self.model.system
+        if any(account.kind == "energy supply" for account in system.ledger):
+            return np.empty(0)
+        self.evaluation.put(0.0, x)
+        return np.asarray(self.model.output_function(self.evaluation.inputs)[[system.output_columns["E_total"]]])
+
     def _solve(self, slopes: Array, right: Array, x: Array) -> Array:
-        """Return the change of the state that changes the rates by ``right`` and keeps the conserved sums unchanged."""
+        """Return the change of the state that changes the rates by ``right`` and keeps what is conserved unchanged."""
         sizes = np.abs(x) + TRACE_COVERAGE
-        matrix = np.vstack((slopes, self._conserved * sizes))
+        kept = np.vstack((self._conserved * sizes, self._slopes(self._energy, x)))
+        still = np.diag(~slopes.any(axis=1))  # a state that nothing moves stays what it is
+        matrix = np.vstack((slopes + still, kept))
         # Rows are scaled, since rates and conserved sums differ by many decades.
         rows = np.maximum(np.abs(matrix).max(axis=1), TINY)
-        found, *_ = np.linalg.lstsq(
-            matrix / rows[:, None], np.append(right, np.zeros(len(self._conserved))) / rows, rcond=None
-        )
+        found, *_ = np.linalg.lstsq(matrix / rows[:, None], np.append(right, np.zeros(len(kept))) / rows, rcond=None)
         return np.asarray(found * sizes)

@@ -98,6 +98,62 @@ def test_a_spectator_keeps_its_coverage(tmp_path):
     assert found.coverages["x(s)"] == pytest.approx(0.3, rel=1e-12)
 
 
+def one_way(tmp_path, case, heats, reactions, **changes):
+    """Steady state with one mol/m^2 of sites: heats [kJ/mol] by species; A and Ea [kJ/mol] of one-way reactions."""
+    found = [
+        f"{{name: {name}(s), composition: {{}}, thermo: {{model: constant-cp, h0: {h} kJ/mol}}}}"
+        for name, h in heats.items()
+    ]
+    rates = [f"{{equation: {r}, rate-constant: {{A: {k}, b: 0, Ea: {Ea}}}}}" for r, (k, Ea) in reactions.items()]
+    surface = f"{{name: s, thermo: ideal-surface, kinetics: surface, species: [{', '.join(f'{x}(s)' for x in heats)}]"
+    lists = {"phases": [f"{surface}, site-density: 1 mol/m^2}}"], "species": found, "reactions": rates}
+    text = "\n".join(f"{key}:\n- " + "\n- ".join(each) for key, each in lists.items())
+    (tmp_path / "m.yaml").write_text(f"units: {{quantity: mol, activation-energy: kJ/mol}}\n{text}\n")
+    (tmp_path / "case.yaml").write_text(case)
+    return steady(tmp_path / "case.yaml", **changes)
+
+
+HELD = """
+bodies: {lower: {temperature: 500 K}, upper: {temperature: 500 K}}
+interface: {temperature: 500 K, mechanism: m.yaml}
+initial: {coverages: {a(s): 1}}
+run: {until: 1 ms}
+"""
+CLOSED = """
+T_0: 500 K
+bodies: {lower: {temperature: T_1, C: 4 kJ/m^2/K, capacity: constant}, upper: {temperature: T_2, C: 1 J/m^2/K}}
+interface: {temperature: T_1, mechanism: m.yaml}
+initial: {T_1: 500 K, T_2: 300 K, coverages: {a(s): 1}}
+run: {until: 1 s}
+"""
+
+
+def test_a_state_that_a_trace_leaves_is_not_the_steady_state(tmp_path):
+    reactions = {"a(s) + b(s) => 2 b(s)": (1, 0), "b(s) => a(s)": (0.1, 0), "a(s) => b(s)": (1e-14, 0)}
+    found = one_way(tmp_path, HELD, {"a": 0, "b": 0}, reactions, of=["R_R3"])
+    assert found.coverages == pytest.approx({"a(s)": 0.1, "b(s)": 0.9})
+
+
+def test_a_case_that_loses_no_heat_keeps_its_energy(tmp_path):
+    """More of b is warmer by its heat, which speeds up both ways; a body apart takes none of it."""
+    cycle = {"a(s) => b(s)": (1e5, 20), "b(s) => a(s)": (1e7, 40)}
+    found = one_way(tmp_path, CLOSED, {"a": 0, "b": -80}, cycle, of=["R_R1"])
+    T, theta, R = found.states["T_1"], found.coverages["b(s)"], 8.31446261815324
+    assert pytest.approx(500 + 20 * theta) == T
+    # ln(theta / (1 - theta)) = ln(k_1 / k_2), and T follows theta.
+    up, down = np.array([20e3, 40e3]) / (R * T**2) * 20
+    moved = 1 / (1 / (theta * (1 - theta)) - up + down)
+    assert found.control["R_R1"]["R1"] == pytest.approx(1 + (up - 1 / (1 - theta)) * moved, rel=1e-6)
+    assert sum(found.control["R_R1"].values()) == pytest.approx(1, rel=1e-6)
+
+
+def test_what_used_up_reactions_have_left_is_not_asked_of_the_state_at_rest(tmp_path):
+    """How much of a became b, which goes on, and how much c, is not in the state at rest."""
+    reactions = {"a(s) => b(s)": (1, 0), "a(s) => c(s)": (3, 0), "b(s) => d(s)": (1, 0), "d(s) => b(s)": (2, 0)}
+    with pytest.raises(InputError, match="R1, R2 used up what they take, and the state at rest depends on what they"):
+        one_way(tmp_path, HELD, dict.fromkeys("abcd", 0), reactions, of=["R_R3"])
+
+
 @pytest.mark.parametrize(
     ("case", "of", "message"),
     [
