@@ -147,11 +147,12 @@ class _Step:
         """
         b, norm, soft, left = self.builder, number(0.0), [], []
         unit = b.fmul(number(GAMMA), self.h)
+        per_unit = b.fdiv(number(1.0), unit)
         for increment, weight in zip(last, self.units, strict=True):
             size = b.fdiv(self._size(increment), weight)
             norm = b.select(b.fcmp_ordered(">", size, norm), size, norm)
         for increment, before, change, weight in zip(last, open_by, changes, self.units, strict=True):
-            closed = b.fsub(b.fdiv(increment, unit), change)
+            closed = b.fsub(b.fmul(increment, per_unit), change)
             left.append(b.fsub(before, closed))
             # Increments of norm one, the tolerance, would close so much more.
             stays = b.fcmp_ordered(">", b.fmul(norm, self._size(left[-1])), self._size(closed))

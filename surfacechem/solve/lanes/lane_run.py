@@ -398,6 +398,7 @@ def _step(w: Any) -> None:
         seen, shown = needs_checks(w, good), any_lane(lanes(w.next_output) < lanes(w.t_new))
         if seen or shown:
             w.interpolate(w, w.columns)
+            w.put_matrices(w)
         elif any_lane(close):
             w.interpolate(w, w.n)
         if seen:
@@ -454,7 +455,7 @@ def loop_of(name: str, end_stage: int, power: float, memory: Mapping[str, Any], 
 run_explicitly = loop_of(
     "ExplicitLanes", END_STAGE, 0.125, EXPLICIT_MEMORY,
     root_of=root_of, try_step=try_step, limit_size=nothing, find_noise=find_noise, find_stiff=find_stiff,
-    put_roughly=put_roughly, interpolate=interpolate, find_defects=find_defects, check_outputs=nothing,
-    keep_step=nothing,
+    put_roughly=put_roughly, interpolate=interpolate, put_matrices=nothing, find_defects=find_defects,
+    check_outputs=nothing, keep_step=nothing,
 )  # fmt: skip
 """Solve the runs of a batch."""

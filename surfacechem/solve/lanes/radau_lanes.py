@@ -589,7 +589,7 @@ def keep_step(w: Any) -> None:
 run_by_radau = loop_of(
     "RadauLanes", STAGES, POWER, RADAU_MEMORY,
     root_of=root_of, try_step=try_step, limit_size=limit_size, find_noise=nothing, find_stiff=nothing,
-    put_roughly=put_roughly, interpolate=interpolate, find_defects=find_defects, check_outputs=check_outputs,
-    keep_step=keep_step,
+    put_roughly=put_roughly, interpolate=interpolate, put_matrices=nothing, find_defects=find_defects,
+    check_outputs=check_outputs, keep_step=keep_step,
 )  # fmt: skip
 """Solve the runs of a batch."""

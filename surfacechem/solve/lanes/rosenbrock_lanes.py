@@ -73,15 +73,20 @@ def put_roughly(w: Any, x: float) -> None:
 
 @compiled
 def interpolate(w: Any, columns: int) -> None:
-    """The polynomials of the steps, and the matrices for checks of them."""
+    """The polynomials of the steps."""
     every, rate = LANES * w.n, 1.0 / lanes(w.h)
     for d in range(ORDER):
         _polynomial(d, w.k.ctypes.data, every, every, w.polynomial[d].ctypes.data)
         for m in range(w.n):
             put(w.polynomial[d, m], lanes(w.polynomial[d, m]) * rate)
+
+
+@compiled
+def put_matrices(w: Any) -> None:
+    """Factor the matrices for checks of the polynomials; the code of a step keeps its own ones."""
     put_start(w)
     radau_lanes.differentiate(w)
-    radau_lanes.factor(w, 0, rate / GAMMA_OF_STAGES, same(0.0))
+    radau_lanes.factor(w, 0, 1.0 / lanes(w.h) / GAMMA_OF_STAGES, same(0.0))
 
 
 @compiled
@@ -97,7 +102,7 @@ def find_defects(w: Any, lane: int, x: Any) -> None:
 run_linearly = loop_of(
     "RosenbrockLanes", END_STAGE, POWER, ROSENBROCK_MEMORY,
     root_of=radau_lanes.root_of, try_step=try_step, limit_size=radau_lanes.limit_growth, find_noise=nothing,
-    find_stiff=find_doubtful, put_roughly=put_roughly, interpolate=interpolate, find_defects=find_defects,
-    check_outputs=radau_lanes.check_outputs, keep_step=nothing,
+    find_stiff=find_doubtful, put_roughly=put_roughly, interpolate=interpolate, put_matrices=put_matrices,
+    find_defects=find_defects, check_outputs=radau_lanes.check_outputs, keep_step=nothing,
 )  # fmt: skip
 """Solve the runs of a batch."""
