@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from itertools import cycle
+from itertools import chain, cycle
 from pathlib import Path
 from typing import Any
 
@@ -47,9 +47,8 @@ def figure(datasets: Sequence[Data], variables: Sequence[str] | None = None, aga
         raise InputError("there is nothing to plot: none of the variables varies.")
     shown = [over, *(name for panel in panels for name in panel.names)]
     names, colours = _labels_with_coincidences(datasets, shown), colours_of(len(datasets))
-    starts = [time_series.first_shown(dataset, panels) for dataset in datasets] if over == "time" else []
     # A dataset that needs a logarithmic axis is unreadable on a linear one; others can be read on both.
-    begin = min((start for start in starts if start is not None), default=None)
+    begin = min(filter(None, [time_series.first_shown(dataset, panels, over) for dataset in datasets]), default=None)
     with style.panels(6.4, 1.2 + 0.17 * len(datasets) + 1.7 * len(panels), len(panels), sharex=True) as (plot, grid):
         for ax, panel in zip(grid[:, 0], panels, strict=True):
             _draw(ax, datasets, panel, over, colours, begin)
@@ -93,7 +92,7 @@ def labels(datasets: Sequence[Data]) -> list[str]:
     ['$\\mu$ = 0.3', '$\\mu$ = 0.6']
     """
     known = [_settings(dataset) for dataset in datasets]
-    every = dict.fromkeys(path for each in known for path in each)
+    every = dict.fromkeys(chain.from_iterable(known))
     paths = [path for path in every if len({each.get(path) for each in known}) > 1]
     texts = [str(dataset.attrs.get("title", "")) for dataset in datasets]
     # More differences than fit into a legend are those of different cases, which differ in their titles.

@@ -74,12 +74,11 @@ def varying_numbers(dataset: Data, axes: Sequence[str], known: Sequence[str]) ->
     """Return the numbers that differ between runs: of bonds, temperatures and times, else others."""
     found = sorted(known, key=lambda name: next(k for k, rank in enumerate(NAME_ORDER) if re.fullmatch(rank, name)))
     ends = [name for name in found if len(dataset[name].dims) == len(axes) and not ("error" in name or name in COUNTED)]
-    # Fractions, of bonds say, are compared with one: those left of broken bonds are rounding.
-    sizes = {name: float(unit(dataset[name]) == "1") for name in ends}
     # Of several with the same values, such as a maximum that is the final value, the first; none that is swept itself.
     first = {thinned(in_each_run(dataset, name)).tobytes(): "" for name in parameters_of(dataset)}
     for name in ends:
-        if varies(values := subsample(dataset, name), sizes[name]):
+        # Fractions, of bonds say, are compared with one: those left of broken bonds are rounding.
+        if varies(values := subsample(dataset, name), float(unit(dataset[name]) == "1")):
             first.setdefault(values.tobytes(), name)
     shown = [*filter(None, first.values())]
     groups = ([name for name in shown if any(re.fullmatch(rank, name) for rank in ranks)] for ranks in TELLING)

@@ -150,7 +150,7 @@ def _stacked(dataset: Data, shown: Sequence[Panel], against: str | None, balance
                 ax.sharex(axes[-1])
                 ax.tick_params(labelbottom=False)
             curved.draw(grid[rows:, 0].tolist(), dataset)
-        first = None if against else first_shown(dataset, shown)
+        first = first_shown(dataset, shown, against or "time")
         for ax, panel in zip(axes, shown, strict=False):
             _draw(ax, dataset, panel, against or "time", first)
         if balances:
@@ -199,8 +199,10 @@ def _usual_at_states(dataset: Data, names: Sequence[str]) -> Sequence[str]:
     return ([name for name in names if unit(dataset[name]) in UNITS_AT_STATES] or names)[:MOST_PANELS_AT_STATES]
 
 
-def first_shown(dataset: Data, panels: Sequence[Panel]) -> float | None:
-    """Return the time at which a logarithmic axis begins; None if a linear one is sufficient for the panels."""
+def first_shown(dataset: Data, panels: Sequence[Panel], over: str = "time") -> float | None:
+    """Return the time at which a logarithmic axis begins; None if a linear one is sufficient, or it is not of time."""
+    if over != "time":
+        return None
     times = dataset["time"].values
     # Fluxes follow from changes of states: their initial values are no reason for a logarithmic axis.
     names = [name for panel in panels if panel.unit != FLUX for name in panel.names if name in dataset]

@@ -119,11 +119,8 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
         _refuse_many(rest, interface)
         if not of:
             rest.drop_small()
-        rates, held = rest.outputs(rest.x), _held(system, rest.values)
+        rates, held = rest.rates_that_matter(), _held(system, rest.values)
         found = [*zip(rest.quantities, rest.x.tolist(), strict=True)]
-        for (name, j), rate in zip(rest.wanted.items(), rates, strict=True):
-            if abs(rate) <= LOOSE_RTOL * rest.largest[j]:
-                raise InputError(f"{name} is zero at rest, so nothing controls it. Ask for what goes on there.")
     changes = np.array([rest.response([f"multiplier.{label}"]) / rates for label in labels])
     barriers = GAS_CONSTANT * rest.values[held[0]] * rest.response(held) / rates if held else np.empty(0)
     return SteadyState(
@@ -233,6 +230,14 @@ class _Rest:
         """Return the requested quantities."""
         self.evaluation.put(0.0, x)
         return np.asarray(self.model.output_function(self.evaluation.inputs)[[*self.wanted.values()]])
+
+    def rates_that_matter(self) -> Array:
+        """Return the requested quantities; InputError if one of them is zero."""
+        rates = self.outputs(self.x)
+        for (name, j), rate in zip(self.wanted.items(), rates, strict=True):
+            if abs(rate) <= LOOSE_RTOL * self.largest[j]:
+                raise InputError(f"{name} is zero at rest, so nothing controls it. Ask for what goes on there.")
+        return rates
 
     def drop_small(self) -> None:
         """Leave out productions that are zero."""

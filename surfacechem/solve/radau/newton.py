@@ -258,6 +258,17 @@ def end_of_step(w: Any, h: float, y: Any, ydot: Any, q: Any) -> None:
 
 
 @compiled
+def _evaluate_stages(w: Any, h: float) -> None:
+    """Evaluate the residuals at all stages."""
+    k, s, rate = w.member, stage_count(w.member), 1.0 / h
+    combine(tables.INVERSE[k].ctypes.data, 7, s, s, w.z.ctypes.data, w.n, w.slopes.ctypes.data)
+    for i in range(s):
+        put_change(w, h, tables.NODES[k, i], w.z[i], w.slopes[i], rate)
+        evaluate(w, RESIDUAL, w.g[i])
+    w.residuals += s
+
+
+@compiled
 def _correct(w: Any) -> float:
     """Compute one Newton correction of all stages, kept in g; return its weighted maximum norm."""
     k, n = w.member, w.n
@@ -353,16 +364,12 @@ def solve_stages(w: Any, h: float) -> int:
     """
     limit = 7 + 2 * w.member
     contraction = max(w.contraction, EPS) ** TRUST
-    k, s, rate_of_time = w.member, stage_count(w.member), 1.0 / h
+    s = stage_count(w.member)
     norm = norm_last = rate_last = 0.0
     w.theta = 0.0
     settled = False
     for iteration in range(limit):
-        combine(tables.INVERSE[k].ctypes.data, 7, s, s, w.z.ctypes.data, w.n, w.slopes.ctypes.data)
-        for i in range(s):
-            put_change(w, h, tables.NODES[k, i], w.z[i], w.slopes[i], rate_of_time)
-            evaluate(w, RESIDUAL, w.g[i])
-        w.residuals += s
+        _evaluate_stages(w, h)
         copy(w.g[s - 1], w.columns)
         norm = _correct(w)
         w.iterations += 1
