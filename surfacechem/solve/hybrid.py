@@ -168,6 +168,8 @@ class Hybrid:
             fired = events.index[events.t == events.t[-1]]
             instant.limits = [int(i) for i in fired if i < instant.first and self.problem.margins[i].terminal]
             index = int(fired[-1]) - instant.first
+            if index >= 0 and index not in self.jumper.folds.items:  # the time of a fold follows from the loads
+                point = instant.on_tick(index, point, end)
         elif lost:
             index = self.jumper.folds.reached(point, self.problem.rtol)
         if index >= 0:

@@ -6,6 +6,7 @@ the state after every flow. Edges are carried out one by one, and each adds its 
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -197,6 +198,21 @@ class Instant:
             self.jumps.pop()
         self.status, self.reason = Status.EVENT, f"{last.edge.reason}, but {UNDRIVEN}"
         return None
+
+    def on_tick(self, index: int, point: Point, end: float) -> Point:
+        """Return the point at which an arc has reached an edge, at the first tick of a run's clock that is not before.
+
+        An arc counts time from its own start, more finely than the run: within a tick a guard may change by more than
+        its uncertainty, and an edge that is carried out before its time is found again, without end.
+        """
+        guards, j, at = self.program.margins, self.first + index, self.jumper.equilibria.corrected(point)
+        assert guards is not None
+        at = self.consistent(at) if self.jumper.guards_read_rates else at
+        # After an arc within one tick time has to go on, whatever the roundoff.
+        still = self.last_flow[0] == point.t
+        least = 0.0 if still else max(drift_of(self.rtol), GUARD_EPS) * self.sizes(point)[j]
+        early = guards(at.inputs())[j] > least
+        return point._replace(t=min(math.nextafter(point.t, math.inf), end)) if early else point
 
     def _may_go_on(self, point: Point) -> bool:
         """True if edges may follow at a moment; False where they chatter, with more edges than any cause needs.
