@@ -27,7 +27,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from surfacechem import laws
 from surfacechem.contracts.terms import Factor, Law, Load, Spec, Varying, resolved_unit
-from surfacechem.contracts.units import TOTAL_UNITS, quotient
+from surfacechem.contracts.units import TOTAL_UNITS, ZERO_CELSIUS, quotient
 from surfacechem.contracts.units import parse as si
 from surfacechem.documents.document import OVERRIDE, Tree
 from surfacechem.errors import InputError, Place, placed
@@ -51,6 +51,8 @@ MOST_LAWS = 500
 # Parameters that are differences of their variable, for which degrees Celsius have no zero.
 DIFFERENCES = ("amplitude",)
 
+KELVIN = VARIABLES["T_c"].unit
+
 UNITS = {name: variable.unit for name, variable in VARIABLES.items() if name not in INTERNAL}
 
 
@@ -65,6 +67,16 @@ class Context(NamedTuple):
     """Unit for which "[x]" stands."""
     whole: bool = False
     """True if quantities per area elsewhere are those of the whole pair of bodies."""
+    remarks: dict[str, None] | None = None
+    """What is told of values that may not be meant as they are read, in order; None where nothing is told."""
+
+    def judge(self, tree: Tree, spec: Spec, value: float) -> None:
+        """Remark on a temperature without a unit that is below 0 degC: it may be meant in degrees Celsius."""
+        # What may be zero kelvin is no temperature but a coefficient.
+        absolute, celsius = spec.unit == KELVIN and spec.at_least < 0, value - float(ZERO_CELSIUS)
+        if self.remarks is not None and absolute and celsius < 0 < value and not str(tree.value).strip()[-1].isalpha():
+            bare = f"{tree.place.path}: {value:g} without a unit is {value:g} K, which is {celsius:.6g} degC"
+            self.remarks[f"{bare}; write `{value:g} K`, or `{value:g} degC` if that is meant"] = None
 
 
 # -- contents of keys -------------------------------------------------------------------------------------------------
@@ -107,11 +119,11 @@ class Number(Content):
         if context.whole:
             spec = spec._replace(unit=TOTAL_UNITS.get(spec.unit, spec.unit))
         if not (isinstance(tree.value, dict) and "value" in tree.value):
-            return number(tree, spec, name, difference=self.difference)
+            return number(tree, spec, name, context, difference=self.difference)
         if not spec.varies:
             raise tree.error(f"{name} cannot vary; give it a value.")
         parts = tree.mapping(["value", "times"])
-        value = number(parts["value"], spec, name)
+        value = number(parts["value"], spec, name, context)
         factors = ListOf(OneLaw(Factor)).read(parts["times"], "times", context) if "times" in parts else None
         return value if factors is None else Varying(value, factors)
 
@@ -127,11 +139,13 @@ class Number(Content):
         return {"anyOf": kinds} if len(bare) > 1 or len(kinds) > 2 else reference("quantity")
 
 
-def number(tree: Tree, spec: Spec, name: str, *, difference: bool = False) -> float:
+def number(tree: Tree, spec: Spec, name: str, context: Context | None = None, *, difference: bool = False) -> float:
     """Return a number in SI, in the range of its specification."""
     value = si(tree.plain(), spec.unit, tree.place, name, difference=difference)
     with placed(tree.place):
         spec.check(name, value)
+    if context is not None and not difference:
+        context.judge(tree, spec, value)
     return value
 
 
@@ -284,7 +298,7 @@ class Prescribed(Content):
             load = OneLaw(Load).read(tree, name, context._replace(x=unit))
         elif load is None:
             try:
-                level = number(tree, Spec(unit, name), name)
+                level = number(tree, Spec(unit, name), name, context)
             except InputError as error:
                 with suppress(InputError):  # a rate instead of a value means a ramp
                     si(tree.plain(), quotient(unit, "s"))

@@ -99,7 +99,7 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     whole = "surface" in top
     units = {name: TOTAL_UNITS.get(unit, unit) for name, unit in UNITS.items()} if whole else UNITS
     names = {**units, **dict.fromkeys(temperatures, "K")}
-    context = Context(names, temperatures, tuple(bodies) or DEFAULT_BODIES, whole=whole)
+    context = Context(names, temperatures, tuple(bodies) or DEFAULT_BODIES, whole=whole, remarks={})
     mechanism = None
     if "mechanism" in interface:
         # The solver decides whether a mechanism may ask Cantera for its rates.
@@ -109,7 +109,9 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
         mechanism = _mechanism(named, interface["mechanism"], Path(base), mechanism_text, evaluate)
         coverages = (variable.name for variable in mechanism.variables)
         context = context._replace(units={**context.units, **dict.fromkeys(coverages, "1")})
-    return read(Document, tree, context), mechanism
+    case = read(Document, tree, context)
+    case.remarks = tuple(context.remarks or ())
+    return case, mechanism
 
 
 def _refuse(top: Mapping[str, Tree], bodies: Mapping[str, Tree], interface: Mapping[str, Tree]) -> None:
@@ -141,6 +143,7 @@ def _temperature_names(owners: Sequence[Tree | None]) -> tuple[str, ...]:
 def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
     """Return the scene that the sections define."""
     interface, surface, heat = _interface(case, mechanism), _surface(case), case.heat
+    interface = replace(interface, remarks=(*interface.remarks, *case.remarks))
     if surface is not None:
         from surfacechem.surfaces.potential import CurvedConductance
 

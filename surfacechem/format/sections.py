@@ -668,3 +668,6 @@ class Document(Section):
     run: RunSection | None = key(Nested(RunSection))
     reference: Tree | None = key(Deferred(REFERENCE), "an exact solution to compare with")
     sweep: SweepSection | None = key(Nested(SweepSection))
+
+    remarks: Sequence[str] = ()
+    """Remarks on values that may not be meant as they are read."""

@@ -98,3 +98,20 @@ def test_aliases_are_values():
 def test_an_override_that_cannot_be_assembled_is_named_as_one():
     with pytest.raises(InputError, match=r"^override: initial: T evolves but has no initial value\. Add `T:` un"):
         load("endothermic", {"initial": {"phi": 0}}).system()
+
+
+COLD = """
+T_0: 300
+interface: {temperature: T}
+bodies: {lower: {temperature: T}, upper: {temperature: {ramp: {start: 20, rate: 1}}}}
+initial: {T: 25}
+"""
+
+
+def test_a_temperature_without_a_unit_that_is_cold_in_kelvin_is_told():
+    remarks = load_text(COLD).scene.interface.remarks
+    told = "25 without a unit is 25 K, which is -248.15 degC; write `25 K`, or `25 degC` if that is meant"
+    assert remarks[1] == f"initial.T: {told}"
+    assert [text.partition(":")[0] for text in remarks] == ["bodies.upper.temperature.ramp.start", "initial.T"]
+    meant = COLD.replace("20", "20 degC").replace("25", "25 K")
+    assert load_text(meant).scene.interface.remarks == ()
