@@ -403,8 +403,13 @@ class History:
         self.rows: list[tuple[Array, Array, Array, Array]] = []
 
     def append(self, t: float, x: Array) -> None:
-        """Record variables at a time, unless it is recorded already."""
+        """Record variables at a time, unless that is the last one; InputError before it."""
         if self.times and t <= self.times[-1]:
+            if t < self.times[-1]:
+                when = f"at t = {t:g} s, but has been recorded up to t = {self.times[-1]:g} s"
+                raise InputError(
+                    f"the interface is {when}. Set `initial_time` of a new network, or make the interface anew."
+                )
             return
         evaluation, n = self.scene.evaluation, len(self.scene.states)
         self.scene.put(t, x)
