@@ -17,7 +17,7 @@ from functools import cache, cached_property
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from surfacechem.documents.cache_folder import version
 from surfacechem.errors import InputError, OutputError, Place, PlacedError, nearest
 
 if TYPE_CHECKING:
+    import netCDF4
     import xarray
 
 R = TypeVar("R")
@@ -42,10 +43,11 @@ LEAST_BANDWIDTH = 1e7
 """Least speed of a disk, in bytes per second."""
 
 READING_TEST = """
+import os
 import sys
 from contextlib import suppress
 import netCDF4
-with netCDF4.Dataset(sys.argv[1]) as file:
+with netCDF4.Dataset(os.fsencode(sys.argv[1]).decode("latin-1"), encoding="latin-1") as file:
     for item in (file, *file.variables.values()):
         for name in item.ncattrs():
             with suppress(Exception):
@@ -295,12 +297,17 @@ def save(target: Path, columns: Sequence[Column], attributes: Mapping[str, str |
         ) from None
 
 
-def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
-    """Write columns and attributes to a new file; OSError if that fails."""
+def opened(path: str | Path, mode: Literal["r", "w"] = "r") -> netCDF4.Dataset:
+    """Open a netCDF file. Its name goes as bytes, since the library refuses one that the locale cannot encode."""
     import netCDF4
 
+    return netCDF4.Dataset(os.fsencode(path).decode("latin-1"), mode, format="NETCDF4", encoding="latin-1")
+
+
+def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
+    """Write columns and attributes to a new file; OSError if that fails."""
     try:
-        with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+        with opened(path, "w") as file:
             for column in columns:  # all are defined before any is written: between these the library looks at all
                 for dimension, size in zip(column.dimensions, np.shape(column.values), strict=True):
                     if dimension not in file.dimensions:
@@ -317,12 +324,11 @@ def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str,
 
 def read_netcdf(path: Path) -> Data:
     """Read the whole dataset of a file as it is written; OSError if it cannot be read."""
-    import netCDF4
 
     def attributes(item: Any) -> dict[str, Any]:
         return {name: item.getncattr(name) for name in item.ncattrs()}
 
-    with netCDF4.Dataset(path) as file:
+    with opened(path) as file:
         file.set_auto_maskandscale(False)
         variables = [
             DataVariable(name, item.dimensions, np.asarray(item[...]), attributes(item))

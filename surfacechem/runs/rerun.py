@@ -16,7 +16,7 @@ from surfacechem import format as cases
 from surfacechem import solve as solvers
 from surfacechem.errors import InputError, Place
 from surfacechem.format.plans import recorded_plan
-from surfacechem.results.netcdf import Column, dataset_path, reading, save_kept
+from surfacechem.results.netcdf import Column, dataset_path, opened, reading, save_kept
 from surfacechem.results.solution import ASKED_SETTINGS, RECORDED_SETTINGS, Solution
 from surfacechem.runs.checking import check
 from surfacechem.runs.simulation import Simulation
@@ -76,9 +76,7 @@ def read(path: str | Path) -> Record:
     """Read the attributes and variables of a netCDF file."""
 
     def record() -> Record:
-        import netCDF4
-
-        with netCDF4.Dataset(path) as file:
+        with opened(path) as file:
             file.set_auto_mask(False)
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}
             variables = {name: np.asarray(variable[...]) for name, variable in file.variables.items()}

@@ -218,7 +218,7 @@ class Page(NamedTuple):
         """Save the page as one HTML file, whole or not at all."""
         text = self.html()
         with replacing(target) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            temporary.write_text(text, encoding="utf-8", errors="surrogateescape")
 
     def _figures(self) -> list[str]:
         """Return the figure as SVG and, if it is narrower, the version that a phone shows instead."""

@@ -1,5 +1,6 @@
 """The command as a process: what it imports, how it ends, how it is interrupted."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -47,8 +48,18 @@ app(["run", "long.yaml"], prog_name="surfacechem")
 COMMAND = [sys.executable, "-m", "surfacechem"]
 
 
-def surfacechem(*arguments, folder):
-    return subprocess.run([*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+def surfacechem(*arguments, folder, **options):
+    arguments = [*COMMAND, *arguments]
+    return subprocess.run(arguments, cwd=folder, capture_output=True, text=True, timeout=300, check=False, **options)
+
+
+def test_names_that_the_locale_cannot_encode(tmp_path):
+    (folder := tmp_path / "prüfung").mkdir()
+    environment = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0"}
+    for command in ("run exothermic -o wärme.nc", "rerun wärme.nc -o again.nc", "report wärme.nc"):
+        done = surfacechem(*command.split(), folder=folder, env=environment)
+        assert (done.returncode, done.stderr) == (0, ""), command
+    assert "wärme.nc" in (folder / "wärme.html").read_text(encoding="utf-8")
 
 
 def imported(folder, *steps):
