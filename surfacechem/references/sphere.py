@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 from surfacechem.references.normal_contact import AttractionOnSpring, SnapPoint
+from surfacechem.tolerances import EQUAL
 
 SEARCH_POINTS = 4001
 """Number of approaches in the search for the steepest attraction, on either side of which the folds are bisected."""
@@ -39,7 +40,8 @@ class SphereOnSpring(AttractionOnSpring):
     def from_scene(cls, scene: SceneView) -> Parameters:
         load = scene.scene.loading.get("w_n")
         times, values = (list(getattr(load, name, ())) for name in ("times", "values"))
-        if len(times) != 3 or values[0] != values[2] or times[2] != 2 * times[1]:
+        same = partial(math.isclose, rel_tol=EQUAL)  # the same length in two units differs by its rounding
+        if len(times) != 3 or not same(values[0], values[2]) or not same(times[2], 2 * times[1]):
             raise InputError("it needs a table of `w_n` that goes to one displacement and back at one speed.")
         speed = (values[0] - values[1]) / times[1]
         return {**super().from_scene(scene), "w_i": values[0], "w_turn": values[1], "speed": speed}

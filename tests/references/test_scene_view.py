@@ -43,3 +43,10 @@ def test_no_exact_solution_claims_a_case_that_it_does_not_solve(name):
 )
 def test_what_a_scene_tells(name, read, value):
     assert read(SceneView(load(name).case.scene, solved(name).trajectory)) == value
+
+
+def test_the_same_length_in_two_units():
+    back = "values: [60 nm, -20 nm, 0.060000000000000005 um]"
+    case = cases.load("sticky-sphere", [f"loading.w_n={{table: {{times: [0 s, 1 s, 2 s], {back}}}}}"])
+    view = SceneView(case.scene, solved("sticky-sphere").trajectory)
+    assert references.get("cohesive-sphere-on-spring").from_scene(view)["w_turn"] == -20e-9
