@@ -361,11 +361,12 @@ def join(path: str, key: str) -> str:
 
 
 def from_plain(value: object, place: Place) -> Tree:
-    """Return a tree of plain Python data, all at one place."""
+    """Return a tree of plain Python data at one place, in which keys of mappings continue its path."""
     if getattr(value, "ndim", None) == 0:  # a number, or a text, of NumPy or xarray
         value = cast("Any", value).item()
     if isinstance(value, Mapping):
-        return Tree({str(key): from_plain(item, place) for key, item in value.items()}, place)
+        entries = ((str(key), item) for key, item in value.items())
+        return Tree({key: from_plain(item, replace(place, path=join(place.path, key))) for key, item in entries}, place)
     if isinstance(value, list | tuple):
         return Tree([from_plain(item, place) for item in value], place)
     if isinstance(value, Real) and not isinstance(value, bool):  # NumPy's numbers too

@@ -269,6 +269,11 @@ sweep:
     [
         ("", {}, "case.yaml:10: .*k_off = -1 is outside .* run with .*x_off = 0.1 nm, .*k_off = -1 1/s; a store"),
         ("", {"over": {"interface.bonding.bell.k_off": [1, -1]}}, "override: .*k_off = -1 is outside its range"),
+        (
+            "",
+            {"over": {"interface.bonding.bell.k_off": [1], "initial.phi": {"from": 0, "too": 1}}},
+            "override: sweep.over.initial.phi: unknown key 'too'",
+        ),
         ("loading.f=10 pN", {"over": {"initial.phi": [0.5, 1]}}, "case.yaml:7: f is no ramp"),
         ("loading.f=10 pN", {"until": {"f": "20 pN"}}, "override: f is no ramp"),
         (TABLE, {"over": {"loading.f": [1, 2]}}, "override: .*loading.f cannot be swept: it is a table of times"),
