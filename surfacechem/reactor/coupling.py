@@ -77,7 +77,11 @@ class Gas(Receiver):
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self.weights = self.phase.molecular_weights  # type: ignore[attr-defined]
+        phase = self.phase  # type: ignore[attr-defined]
+        if phase.thermo_model != "ideal-gas":
+            other = f"the phase {phase.name} is {phase.thermo_model}"
+            raise InputError(f"{type(self).__name__} is an ideal gas, {other}. A solid or a liquid is a ReactingSolid.")
+        self.weights = phase.molecular_weights
 
     def after_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
         """Add to Cantera's balances of mass, energy and species; Cantera calls it after their evaluation."""

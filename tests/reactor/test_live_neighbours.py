@@ -263,6 +263,7 @@ def beside(case=WARM, **neighbours):
 REFUSED = [
     (lambda _: beside(gas=fuel(ct.IdealGasReactor)), "gas must be a ReactingGas or a ReactingSolid, as IdealGasReacto"),
     (lambda _: beside(gass=fuel()), "surface metal_surface has a neighbour 'gass'. Did you mean 'gas'"),
+    (lambda _: ReactingGas(ct.Solution("graphite.yaml"), clone=True), "phase graphite is fixed-stoichiometry. A so"),
     (lambda _: beside(gas=ReactingGas(ct.Solution("h2o2.yaml"), clone=True)), "gas has other species than the mechan"),
     (lambda solid: (beside(ELECTRODE, anode=solid), run(solid)), "the interface interface to which .* is not in the n"),
     (lambda _: run(beside(gas=fuel())), "the neighbour gas of interface is not in the network"),
