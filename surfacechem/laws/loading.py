@@ -11,6 +11,7 @@ from typing import ClassVar
 from surfacechem.contracts.terms import Load, option, parameter
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, sin
+from surfacechem.tolerances import ZERO_TIME
 
 
 class Hold(Load):
@@ -102,6 +103,9 @@ class Table(Load):
             raise InputError("times and values of a table must be finite.")
         if any(b < a for a, b in pairwise(self.times)):
             raise InputError("times of a table must never decrease.")
+        for a, b in pairwise(self.times):
+            if 0 < b - a < ZERO_TIME:
+                raise InputError(f"{b - a:g} s between two times of a table is no time: for a jump give {b:g} s twice.")
         for t, later in zip(self.times, self.times[2:], strict=False):
             if t == later:
                 raise InputError(f"a table has no time three times, as {t:g} s; twice is a jump.")

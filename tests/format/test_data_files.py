@@ -86,6 +86,7 @@ def test_editors_know_both_ways(table):
         ("t s, Q_1 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: the heading of column 1 is no name with a unit, like"),
         ("t [s], Q_1 [W/m^2]\n0, 0\n1, 1, 1\n", r"heat.csv:3: 3 values for 2 columns"),
         ("t [s], Q_1 [W/m^2]\n\n2, 0\n1, 1\n", r"heat.csv:4: times must never decrease"),
+        ("t [s], Q_1 [W/m^2]\n0, 0\n1e-300, 1\n", r"heat.csv: 1e-300 s between two .* for a jump give 1e-300 s twice"),
         ("t [s], Q_1 [W/m^2]\n1, 0\n1, 1\n1, 2\n", r"heat.csv: a table has no time three times, as 1 s; twice is"),
         (
             "t [s], Q_2 [W], x [W]\n0, 0, 0\n1, 1, 1\n",

@@ -81,6 +81,12 @@ def test_an_initial_state_that_no_law_allows():
     assert str(case.located(error.value)).startswith("case.yaml:5: interface: at the start the heat capacity at T was")
 
 
+def test_a_start_below_the_least_temperature_tells_it():
+    told = r"T > 0 does not hold: -1e-09\). Below 1e-09 K it counts as zero\.$"
+    with pytest.raises(InputError, match=told):
+        surfacechem.run("exothermic", {"initial.T": 1e-300})
+
+
 def test_every_error_of_the_model_carries_a_path():
     """So that rewording a message never moves it to another line."""
     folder = Path(surfacechem.__file__).parent / "model"

@@ -97,7 +97,8 @@ def rows(build: Build) -> Iterator[PowerFlow | State | Margin]:
     centre = thermal.members.get(INTERFACE, "")
     build.rows.energies(own_rows, centre if centre in own_rows else next(iter(own_rows), ""))
     for node in (*thermal.free, *thermal.prescribed):
-        yield Margin(f"{node.name} > 0", node.T - NO_AMOUNT, f"the temperature {node.name} reached zero")
+        reason, least = f"the temperature {node.name} reached zero", f"Below {NO_AMOUNT:g} K it counts as zero."
+        yield Margin(f"{node.name} > 0", node.T - NO_AMOUNT, reason, remedy=least)
         if node.prescribed:
             if node.energies:
                 build.rate_of(node.name)  # refuses a jump, whose heat would be unknown
