@@ -194,3 +194,10 @@ def test_sweeps_name_the_mechanism_as_the_case_does(tmp_path):
     case = pairs(tmp_path, reversible=reversible, force="0 pN")
     with pytest.raises(InputError, match=r"^bonds\.yaml:\d+: "):
         case.sweep({"loading.f": ["0 pN", "5 pN"]})
+
+
+@pytest.mark.parametrize(("end", "told"), [("0 Pa", True), ("1 Pa", False)])
+def test_a_stage_that_waits_for_what_is_so_from_the_start_is_told(end, told):
+    """Bonds far from touch pull with 1e-245 Pa, whose sign is roundoff."""
+    warnings = surfacechem.load("press-hold-pull", [f"programme.approach.until.p={end}"]).system.warnings
+    assert any("the stage approach waits until p rises to 0, which it is" in text for text in warnings) == told

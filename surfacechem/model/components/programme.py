@@ -70,7 +70,7 @@ def _during(i: int) -> Expression:
     return symengine.Lt((STAGE - i) ** 2, symengine.RealDouble(0.25))
 
 
-def stages(build: Build) -> Iterator[Constraint]:
+def stages(build: Build) -> Iterator[Constraint | str]:
     """Yield the edge at the end of each stage: after a time, at a value of a variable, or along another edge."""
     begun, edges = STAGE_START.symbol, []
     waiting = [(i, item) for i, item in enumerate(build.scene.programme) if item.event and item.duration is None]
@@ -81,6 +81,9 @@ def stages(build: Build) -> Iterator[Constraint]:
             modes, reason = {STAGE: symengine.Integer(i + 1), begun: build.t}, f"the stage {item.name} ends"
             guard = _left(build, item)
             edges.append(Edge(f"end of {item.name}", guard, reason, modes, ends_stage=True, when={STAGE: (i,)}))
+            if i == 0 and item.variable and build.at_start(guard) == 0:
+                told = f"the stage {item.name} waits until {_awaited(item)}, which it is from the start"
+                yield f"{told}: roundoff may decide when the stage ends. Give another value."
 
     def advancing(edge: Edge) -> dict[Expression, Expression]:
         """Return the new stage and its start time along an edge that stages wait for."""
