@@ -114,8 +114,7 @@ def steady(source: Source, of: Sequence[str] = (), overrides: Overrides = ()) ->
             message = f"the scene has jumps ({names}), so that a steady state is not the root of one set of equations."
             raise InputError(message, path="interface")
         interface = case.scene.interface
-        kept = _conserved(interface.variables, interface.reactions)
-        rest = _Rest(Model(system), case.run, _wanted(system, of), kept)
+        rest = _Rest(Model(system), case.run, _wanted(system, of), interface)
         _refuse_many(rest, interface)
         if not of:
             rest.drop_small()
@@ -170,7 +169,7 @@ def _refuse_many(rest: _Rest, interface: Interface) -> None:
         if not (law.one_way and {name for name, nu in law.stoichiometry().items() if nu < 0} - names)
     ]
     kept = [[weights.get(coverage.name, 0.0) for coverage in there] for weights in rest.conserved]
-    if len(_conserved(there, going)) > np.linalg.matrix_rank(np.reshape(kept, (-1, len(there)))):
+    if len(_conserved(there, going)) > np.linalg.matrix_rank(np.reshape(kept, (len(kept), len(there)))):
         ended = listed([law.label for law in interface.reactions if law not in going], 4)
         message = f"{ended} used up what they take, and the state at rest depends on what they had made until then."
         remedy = "Ask for the state alone, with `until: steady` under `run`."
@@ -192,10 +191,9 @@ def _held(system: System, values: Mapping[str, float]) -> list[str]:
 class _Rest:
     """The equations at their steady state, with multipliers and temperatures that can be varied."""
 
-    def __init__(
-        self, model: Model, run: Run, wanted: dict[str, int], conserved: Sequence[Mapping[str, float]]
-    ) -> None:
-        self.model, self.values, self.wanted, self.conserved = model, model.values(), wanted, conserved
+    def __init__(self, model: Model, run: Run, wanted: dict[str, int], interface: Interface) -> None:
+        self.model, self.values, self.wanted = model, model.values(), wanted
+        self.conserved = _conserved(interface.variables, interface.reactions)
         self.time = run.times[-1]
         for _ in range(MOST_ATTEMPTS):
             reached = model.solve(replace(run, times=(0.0, self.time), picture=None))
@@ -205,7 +203,9 @@ class _Rest:
             self.evaluation = Evaluation(problem.program, reached.result.y, problem.parameters[-1])
             states = [model.system.states[j] for j in self.evaluation.free]
             self.quantities = [state.quantity for state in states]
-            kept = [[weights.get(quantity.name, 0.0) for quantity in self.quantities] for weights in conserved]
+            # Fractions, whose scale is 1, change relative to themselves down to a trace; not so a potential near zero.
+            self._floor = np.array([TRACE_COVERAGE if state.scale == 1 else state.scale for state in states])
+            kept = [[weights.get(quantity.name, 0.0) for quantity in self.quantities] for weights in self.conserved]
             self._conserved = np.reshape(kept, (-1, len(states)))
             found = self._root(start := reached.result.y[self.evaluation.free])
             if found is not None and np.all(np.abs(found - start) <= NEGLIGIBLE * np.abs(found) + run.rtol):
@@ -220,6 +220,10 @@ class _Rest:
         """Units of the requested quantities and of all states other than coverages."""
         asked = (self.model.system.outputs[j].quantity for j in self.wanted.values())
         return {quantity.name: quantity.unit for quantity in (*asked, *self.quantities) if not quantity.species}
+
+    def _sizes(self, x: Array) -> Array:
+        """Return the sizes of the states, of which their changes are parts."""
+        return np.asarray(np.abs(x) + self._floor)
 
     def rates(self, x: Array) -> Array:
         """Return the time derivatives of the states."""
@@ -256,7 +260,7 @@ class _Rest:
             parameters[columns] = first
         (up, out_up), (down, out_down) = ends
         moved = self._solve(self._slopes(self.rates, self.x), -(up - down) / (2 * CBRT_EPS), self.x)
-        part = CBRT_EPS / max(float(np.max(np.abs(moved) / (np.abs(self.x) + TRACE_COVERAGE))), 1.0)
+        part = CBRT_EPS / max(float(np.max(np.abs(moved) / self._sizes(self.x))), 1.0)
         following = (self.outputs(self.x + part * moved) - self.outputs(self.x - part * moved)) / (2 * part)
         return np.asarray((out_up - out_down) / (2 * CBRT_EPS) + following)
 
@@ -267,21 +271,21 @@ class _Rest:
             x = x + step
             if not np.all(np.isfinite(x)):
                 return None
-            if np.all(np.abs(step) <= RUN_EPS * np.abs(x) + TRACE_COVERAGE):
+            if np.all(np.abs(step) <= RUN_EPS * self._sizes(x) + TRACE_COVERAGE):
                 return x
         return None
 
     @property
     def _growth(self) -> float:
         """The rate [1/s] at which disturbances grow at the root; 0 where all decay, or none beyond rounding."""
-        rates = np.linalg.eigvals(self._slopes(self.rates, self.x) / (np.abs(self.x) + TRACE_COVERAGE)[:, None])
+        rates = np.linalg.eigvals(self._slopes(self.rates, self.x) / self._sizes(self.x)[:, None])
         fastest = float(rates.real.max())
         return fastest if fastest > CONSERVED_RATE * float(np.abs(rates).max()) else 0.0
 
     def _slopes(self, of: Callable[[Array], Array], x: Array) -> Array:
         """Return the derivatives of the rates, or of the energy, by relative changes of the states."""
         columns = []
-        for j, size in enumerate(np.abs(x) + TRACE_COVERAGE):
+        for j, size in enumerate(self._sizes(x)):
             step = np.zeros(len(x))
             step[j] = CBRT_EPS * size
             columns.append((of(x + step) - of(x - step)) / (2 * CBRT_EPS))
@@ -297,7 +301,7 @@ class _Rest:
 
     def _solve(self, slopes: Array, right: Array, x: Array) -> Array:
         """Return the change of the state that changes the rates by ``right`` and keeps what is conserved unchanged."""
-        sizes = np.abs(x) + TRACE_COVERAGE
+        sizes = self._sizes(x)
         kept = np.vstack((self._conserved * sizes, self._slopes(self._energy, x)))
         still = np.diag(~slopes.any(axis=1))  # a state that nothing moves stays what it is
         matrix = np.vstack((slopes + still, kept))

@@ -68,15 +68,18 @@ def test_under_a_current_the_reactions_come_to_carry_it(edge):
     assert float(data["i_electron"][-1]) == pytest.approx(3.0, rel=1e-6)
 
 
-def test_at_rest_under_a_current(edge):
-    """The reaction carries what is given, whatever its rate constant; the potential makes up for it."""
-    text = case("electric-potential: -2.9 V, capacitance: 0.2 F/m^2, current: -3 A/m^2")
+@pytest.mark.parametrize("shift", [0.0, 2.967022365221])
+def test_at_rest_under_a_current(edge, shift):
+    """The reaction carries what is given, whatever its rate constant; the potential, near zero too, makes up for it."""
+    text = case(f"electric-potential: {shift - 2.9} V, capacitance: 0.2 F/m^2, current: -3 A/m^2")
+    text = text.replace('rest: "PF6-[elyt]"', f'rest: "PF6-[elyt]"\n        electric-potential: {shift} V')
     rest = surfacechem.steady(text, of=["i_electron", "q_n"])
     assert rest.coverages == {"(dummy)": 1.0}
-    assert rest.states["V_electron"] == pytest.approx(brentq(lambda V: current(edge, V) - 3.0, -3.3, -2.5), abs=1e-9)
+    carried = brentq(lambda V: current(edge, V) - 3.0, -3.3, -2.5)
+    assert rest.states["V_electron"] == pytest.approx(carried + shift, abs=1e-9)
     assert rest.rates["i_electron"] == pytest.approx(3.0, rel=1e-9)
     assert rest.control["i_electron"]["R1"] == pytest.approx(0.0, abs=1e-6)
-    assert "V_electron  -2.9" in str(rest)
+    assert f"V_electron  {carried + shift:.6g} V" in str(rest)
 
 
 def test_beside_a_particle_that_fills(tmp_path):

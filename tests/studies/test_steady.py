@@ -161,6 +161,7 @@ def test_what_used_up_reactions_have_left_is_not_asked_of_the_state_at_rest(tmp_
         ("dna-adhesive", (), "nothing is made in a neighbour: name the rates that matter"),
         ("dna-adhesive", ("R_R2",), "the case has no quantity 'R_R2'. Did you mean 'R_R1'"),
         ("dna-adhesive", ("R_R1",), "R_R1 is zero at rest, so nothing controls it"),
+        ("bond-constant-force", ("mu",), "mu is zero at rest, so nothing controls it"),
         ("stick-slip", ("p",), r"stick-slip.yaml:\d+: .* changes in time"),
         ("slow-passage", (), r"slow-passage.yaml:\d+: .* has jumps \(touch, release\), so that"),
         ("catch-bond", (), r"catch-bond.yaml:1: nothing is made .* `--of R_two_pathway`"),
