@@ -471,7 +471,9 @@ class Jumper:
         found, start, fold = self.equilibria, pending.start, pending.fold
         slip = 0.0 if found.slip is None else start.parameters[found.slip]
         if not slip:
-            return found.equilibrate(start, heat, lost=fold)
+            # At touch only the integration has left a residual: what is unstable there moves off.
+            balanced = pending.slack.balanced if pending.edge.measure else BALANCED
+            return found.equilibrate(start, heat, balanced, fold)
         stuck = None if fold is None else self.folds.held_at(pending.index, fold)
         trial = found.equilibrate(found.with_slip(start, 0.0), heat, lost=stuck)
         if trial is None:
