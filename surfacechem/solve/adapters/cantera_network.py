@@ -269,13 +269,12 @@ class _Stretch(Method):
     together = MOST_TOGETHER
 
     def __init__(self, view: View, t: float, end: float, y: Array) -> None:
-        self.reactor = _SystemReactor(_nothing(), view, y[view.differential])
+        self.view, self.reactor = view, _SystemReactor(_nothing(), view, y[view.differential])
         self.net = cantera.ReactorNet([self.reactor])
         self.net.rtol, self.net.atol = view.problem.rtol, self.reactor.tolerance
         self.net.initial_time = t
         self.longest = min(LONGEST_STEP * (end - t), view.problem.spacing)
         self.t, self.end = t, end
-        self.net.max_time_step = self.longest
         self.last: Array | None = None
         """Variables, in their units, and their first two derivatives after the last step."""
         self.failure: Exception | None = None
@@ -284,9 +283,11 @@ class _Stretch(Method):
         state, step, derivative, end = self.reactor.scaled, self.net.step, self.net.get_derivative, self.end
         times, ends = [self.t], np.empty((most + 1, 3, len(state)))
         ends[0] = state if self.last is None else self.last
+        growing = self.view.growing_size(self.t, (ends[0, 0] * self.reactor.unit)[: self.reactor.count])
+        longest = self.net.max_time_step = min(self.longest, max(growing, FORMULA_EPS * end))
         while len(times) <= most and times[-1] < end and self.failure is None:
             # Cantera has no stop time, and a step beyond the end would miss what changes there.
-            if end - times[-1] < self.longest:
+            if end - times[-1] < longest:
                 self.net.max_time_step = max(end - times[-1], FORMULA_EPS * end)
             try:
                 now, row = step(), ends[len(times)]

@@ -22,6 +22,7 @@ class _Stretch(SingleSteps):
     def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array) -> None:
         super().__init__(view.problem.max_steps, t, end)
         self.failure: Exception | None = None
+        self.view = view
         options: dict[str, Any] = {
             "rtol": max(view.problem.rtol, SMALLEST_RTOL),
             "atol": view.atol,
@@ -36,6 +37,8 @@ class _Stretch(SingleSteps):
 
     def several(self, most: int) -> Steps:
         steps: list[DenseStep] = []
+        longest = min(self.view.problem.spacing, self.view.growing_size(self.t, self.solver.y))
+        self.solver.max_step = longest  # type: ignore[attr-defined]  # of each of SciPy's implicit methods
         while self.failure is None and len(steps) < most and not (steps and self.t == self.end):
             try:
                 steps.append(self.advance())
