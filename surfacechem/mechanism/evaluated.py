@@ -83,7 +83,7 @@ def hold(surface: Any, given: Mapping[str, Neighbour] | None, place: Place | Non
         refuse_unknown([name], surface.adjacent, f"the surface {surface.name} has no neighbour '{{}}'", state.place)
     for name, phase in surface.adjacent.items():
         state = given.get(name, Neighbour(place=place))
-        if problem := _problem(phase, state) or _misheld(name, state):
+        if problem := _problem(phase, state) or _misheld(phase, state):
             raise InputError(problem, state.place)
         held = HeldPhase(phase, state)
         held.put(phase.T, held.at_start)
@@ -119,9 +119,12 @@ def _uneven(name: str, parts: Mapping[str, float], rest: bool) -> str:
     return f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1." if wrong else ""
 
 
-def _misheld(name: str, state: Neighbour) -> str:
+def _misheld(phase: Any, state: Neighbour) -> str:
     """Return the error of the charge data of a phase, in words; empty if there is none."""
+    name = phase.name
     if state.capacitance is None:
+        if state.electric_potential is not None and not any(phase.charges):
+            return f"`electric-potential` of the neighbour {name} is without effect, since its species have no charge."
         need = f"the current into the neighbour {name} needs a `capacitance`, else its potential is given."
         return "" if state.current is None else need
     given = state.electric_potential

@@ -100,9 +100,19 @@ def test_beside_a_particle_that_fills(tmp_path):
     assert stored + became == pytest.approx(-3.0 * 40.0, rel=1e-9)
 
 
-def test_a_phase_that_gets_no_charge_is_refused():
-    text = case("electric-potential: -3 V").replace('"V[anode]": 0.5}', '"V[anode]": 0.5}, capacitance: 1 F/m^2', 1)
-    with pytest.raises(InputError, match="no reaction brings charge to anode, and no `current` does"):
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("capacitance: 1 F/m^2", "no reaction brings charge to anode, and no `current` does"),
+        (
+            "electric-potential: -3 V",
+            "`electric-potential` of the neighbour anode is without effect, since its species",
+        ),
+    ],
+)
+def test_a_phase_that_gets_no_charge_is_refused(key, message):
+    text = case("electric-potential: -3 V").replace('"V[anode]": 0.5}', f'"V[anode]": 0.5}}, {key}', 1)
+    with pytest.raises(InputError, match=message):
         surfacechem.load(text).model  # noqa: B018
 
 
