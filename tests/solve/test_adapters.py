@@ -50,13 +50,13 @@ def test_what_cannot_go_on_is_no_success(name, rows, last):
     assert last == 0.0 or np.isfinite(result.y).all()
 
 
-@pytest.mark.parametrize("name", ["cantera", "bdf", "scipy-radau"])
+@pytest.mark.parametrize("name", ["cantera", "bdf", "scipy-radau", "cvode", "ida"])
 def test_what_grows_from_below_the_tolerance_is_not_damped(name: str) -> None:
     """The same as of our stepper: a long step would rest on the unstable equilibrium, -1e-14, at any tolerance."""
     program = scalar(DY - Y * (1 - Y) - 1e-14)
     result = solver(name).solve(problem(program, [0.0], [0.0, 1e4], 1e-3, atol=1e-10))
     assert result.status.success
-    assert result.y[0] == pytest.approx(1.0)
+    assert result.y[0] == pytest.approx(1.0, rel=1e-3)
 
 
 def steep(name: str, row, start: float, end: float, **more):

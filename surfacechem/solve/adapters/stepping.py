@@ -159,6 +159,8 @@ class SteppingSolver(Solver):
     """A solver made of a library's single steps."""
 
     counts_rejected = False
+    keeps_longest = False
+    """True if its longest step is that of the start."""
     keeps_algebraic = False
     """True if x includes the algebraic variables."""
 
@@ -264,6 +266,8 @@ class _Run:
             if self.problem.record_steps and not self.steps:
                 self.steps.append((np.array([start]), self.y[None], self.ydot[None], self.ledger[None]))
             stop = end if self.aim is None or self.aim <= start else self.aim
+            if self.solver.keeps_longest:  # a limit of its steps has to be lifted by another start
+                stop = min(stop, start + FIRST_TOGETHER * self.view.growing_size(start, y[self.view.differential]))
             method = self.solver.begin(self.view, start, stop, self.y, self.ydot)
             try:
                 self.restarts = self._to_event(method, stop)

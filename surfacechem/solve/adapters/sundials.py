@@ -10,7 +10,7 @@ from sksundae.cvode import CVODE
 from sksundae.ida import IDA
 
 from surfacechem.solve.adapters.stepping import Method, SingleSteps, StepError, SteppingSolver, View
-from surfacechem.solve.contract import Array, Problem
+from surfacechem.solve.contract import Array
 from surfacechem.tolerances import RUN_EPS
 
 NAMES = ("cvode", "ida")
@@ -62,16 +62,17 @@ class _Stretch(SingleSteps):
         return np.array(answer.y)
 
 
-def _options(problem: Problem) -> dict[str, Any]:
+def _options(view: View, t: float, y: Array) -> dict[str, Any]:
     """Return the settings that both libraries take; a longest step of 0 is unlimited."""
-    longest = problem.spacing if np.isfinite(problem.spacing) else 0.0
-    return {"rtol": problem.rtol, "max_num_steps": 100_000, "max_step": longest}
+    longest = min(view.problem.spacing, view.growing_size(t, y[view.differential]))
+    return {"rtol": view.problem.rtol, "max_num_steps": 100_000, "max_step": longest if np.isfinite(longest) else 0.0}
 
 
 class CVODESolver(SteppingSolver):
     """BDF of variable order; algebraic variables are eliminated inside the right-hand side."""
 
     name = "cvode"
+    keeps_longest = True
 
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
 
@@ -82,7 +83,7 @@ class CVODESolver(SteppingSolver):
             out[:] = view.reduced_jacobian(t + since, x)
 
         self.check(len(y[view.differential]))
-        library = CVODE(rates, atol=view.atol, jacfn=jacobian, **_options(view.problem))
+        library = CVODE(rates, atol=view.atol, jacfn=jacobian, **_options(view, t, y))
         return _Stretch(library, view.problem.max_steps, t, end, y[view.differential])
 
 
@@ -90,7 +91,7 @@ class IDASolver(SteppingSolver):
     """BDF of variable order on the implicit equations themselves."""
 
     name = "ida"
-    keeps_algebraic = True
+    keeps_algebraic = keeps_longest = True
 
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
         def residual(since: float, x: Array, rate: Array, out: Array) -> None:
@@ -101,7 +102,7 @@ class IDASolver(SteppingSolver):
             by_state, by_rate = view.matrices(t + since, x, rate)
             out[:] = by_state + shift * by_rate
 
-        indices, options = list(view.algebraic) or None, _options(view.problem)
+        indices, options = list(view.algebraic) or None, _options(view, t, y)
         library = IDA(residual, atol=view.problem.atol, jacfn=jacobian, algebraic_idx=indices, **options)
         return _Stretch(library, view.problem.max_steps, t, end, y, ydot)
 
