@@ -242,6 +242,16 @@ def test_what_becomes_slow_within_a_step_lags(stiff, soft, rtol, method):
     assert alike(program, [0.0], [], 1.0, rtol, method) == pytest.approx(1 - lag, rel=10 * rtol)
 
 
+@pytest.mark.parametrize("method", [(), ("implicit_lanes",)])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-6, 1e-8])
+def test_what_becomes_slow_within_a_thousandth_of_a_run_lags(rtol, method):
+    """Corrections by a matrix that is stiffer by 36 decades are nothing: what they close is roundoff."""
+    rate = se.exp(np.log(10.0) * (12.0 - 18.0 * se.tanh(1000.0 * (T - 0.5))))
+    program = compile_program(T, [Y], [DY], [], [DY + rate * (Y - se.sin(3.0 * T))])
+    exact, found = (alike(program, [0.0], [], 1.0, each, method, spacing=1 / 60) for each in (1e-12, rtol))
+    assert found == pytest.approx(exact, rel=10 * rtol)
+
+
 @cache
 def kinetics(n):
     """A ring of reversible first-order reactions with exchanges of pairs, by mass action, and the heat of each kind."""

@@ -314,8 +314,8 @@ def _is_astray(w: Any, stages: int, h: float, norm: float) -> bool:
     evaluate(w, RESIDUAL, w.rhs)
     w.residuals += 1
     for i in range(w.core):
-        # Corrections of norm one, the tolerance, would close so much more.
-        if norm * abs(w.rhs[i]) <= abs(w.rhs[i] - w.columns[i]):
+        # Corrections of norm one, the tolerance, would close so much more; what roundoff closes counts for nothing.
+        if max(norm, NEWTON_EPS) * abs(w.rhs[i]) <= abs(w.rhs[i] - w.columns[i]):
             w.columns[i] = 0.0
     if not _may_be_open(w, h, w.columns):
         return False
