@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.radau.dense import finish_step, keep_polynomial, put_inside, put_scanned, scan_step
-from surfacechem.solve.radau.explicit import step_explicitly
-from surfacechem.solve.radau.newton import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
-from surfacechem.solve.radau.step import estimate_error, store_polynomial, too_small
+from surfacechem.solve.radau.newton import factor_newton, set_stage, stage_count
+from surfacechem.solve.radau.step import repeat_step, store_polynomial, too_small
 from surfacechem.solve.radau.tables import SCAN_EDGE, SCANNED
 from surfacechem.solve.radau.work import MARGINS, any_true, clear, compiled, copy, evaluate, put
 from surfacechem.tolerances import CBRT_EPS, EPS, FORMULA_EPS, LOOSE_RTOL, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY
@@ -351,27 +350,17 @@ def _first(w: Any, h: float) -> tuple[int, float]:
 
 
 @compiled
-def _step_implicitly(w: Any, size: float) -> float:
-    """Repeat the step with another size; return the norm of its error."""
-    w.h_factored = 0.0
-    if not factor_newton(w, size):
-        return np.inf
-    predict(w, size)
-    if solve_stages(w, size) != CONVERGED:
-        return np.inf
-    store_polynomial(w, size, 0.0)
-    return estimate_error(w, size)
-
-
-@compiled
 def _step_onto(w: Any, size: float, worst: float) -> float:
     """Repeat the step with another size and the full order of the method, and evaluate the margins at its end.
 
     Return the size, or 0 if the step fails or its error is not below ``worst``.
     """
-    norm = step_explicitly(w, size, np.inf) if w.explicit != 0 else _step_implicitly(w, size)
+    w.h_factored = 0.0
+    norm = repeat_step(w, size) if w.explicit != 0 or factor_newton(w, size) else np.inf
     if not norm < np.inf:
         return 0.0
+    if w.explicit == 0:
+        store_polynomial(w, size, 0.0)
     finish_step(w, size)
     set_stage(w, stage_count(w.member) - 1, size)
     evaluate(w, MARGINS, w.margin)

@@ -213,8 +213,11 @@ def predict(w: Any, h: float) -> None:
         return
     for m in range(w.n):
         row = w.z_polynomial[m]
-        # Predictions start at the end of the stored step, or at its start where the step is repeated with another size.
+        # Predictions start at the end of the stored step, or at its start where the step is repeated with another size,
+        # or inside where a part of it is.
         start = 0.0 if w.offset == 0.0 else w.z_last[top - 1, m]
+        if 0.0 < w.offset < 1.0:
+            start = value_and_slope(last, top - 1, w.offset, row)[0]
         for i in range(s):
             x = w.offset + tables.NODES[k, i] * h / w.h_last
             z[i, m] = value_and_slope(last, top - 1, x, row)[0] - start

@@ -1,33 +1,49 @@
 """Outputs inside a step.
 
 The collocation polynomial is used if it satisfies the equations between the stages. In components that follow others
-instantaneously it merely interpolates, and the error estimate of the step does not include that error; then an output
-is computed by a separate step from the start of the main step, with the full order of the method.
+instantaneously it merely interpolates, and the error estimate of the step does not include that error; nor is it as
+accurate as the ends of long steps, whose order is higher. Then the step is repeated in equal parts, whose polynomials
+are better. Outputs for which these do not serve either are computed by a step onto each, with the full order of the
+method.
 """
 
 from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.dense import integrate_ledger, keep_polynomial, probe_ledger, put_inside, scan_step
+from surfacechem.solve.radau.dense import (
+    finish_step,
+    integrate_ledger,
+    keep_polynomial,
+    probe_ledger,
+    put_inside,
+    scan_step,
+)
 from surfacechem.solve.radau.explicit import step_explicitly
 from surfacechem.solve.radau.newton import (
-    CONVERGED,
     end_of_step,
     factor_newton,
     nested_four,
-    predict,
-    solve_stages,
     stage_count,
 )
 from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
-from surfacechem.solve.radau.step import filter_residual, store_polynomial
+from surfacechem.solve.radau.step import filter_residual, repeat_step, store_polynomial
 from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE, SCANNED
 from surfacechem.solve.radau.work import compiled, copy
 from surfacechem.tolerances import FINER_BY
 
 POLYNOMIAL_ERROR = 2.0
 """Largest error of the polynomial between its stages, in units of the tolerance."""
+
+PART_ERROR = 0.1
+"""The same of the polynomial of a part of a step: a choice that keeps the accuracy of a step onto each output. Half a
+step has an error a hundred times smaller, so that a larger one would save little.
+"""
+
+FEW_PARTS = 16
+"""Most parts in which a step is repeated for its outputs: a choice. More cost more than a step onto each of a few
+outputs, whose number must not decide: none of them depends on others.
+"""
 
 MOST_PARTS = 64
 """Most parts of a step, equal in time or in its logarithm, between which states are stored: a polynomial of order 7
@@ -51,21 +67,9 @@ def _largest(w: Any, floor: float) -> float:
 
 
 @compiled
-def _write_by_step(w: Any, times: Any, outputs: Any, i: int, h: float, origin: float) -> None:
-    """Write an output computed by a separate step of full order; from the polynomial if Newton's method fails."""
-    size, stepped = ((times[i] - origin) - w.base) - w.tau, False
-    if 0.0 < size < h and w.explicit != 0:
-        stepped = step_explicitly(w, size, np.inf) < np.inf
-    elif 0.0 < size < h and factor_newton(w, size):
-        predict(w, size)
-        w.contraction = 1.0
-        stepped = solve_stages(w, size) == CONVERGED
-    if stepped:
-        if w.n_ledger > 0:
-            integrate_ledger(w, size)
-        end_of_step(w, size, outputs[i], w.trial_dot, outputs[i, w.n :])
-    else:
-        write_four(w, times, outputs, i, i + 1, h, origin)
+def _passed(w: Any, time: float, origin: float) -> float:
+    """Return the time from the start of the step to an output."""
+    return float(((time - origin) - w.base) - w.tau)
 
 
 @compiled
@@ -74,7 +78,7 @@ def write_four(w: Any, times: Any, outputs: Any, first: int, end: int, h: float,
     k, x, n = w.member, w.fractions, w.n
     top, last = stage_count(k) + 1, end - 1
     for i in range(4):
-        x[i] = min(max((((times[min(first + i, last)] - origin) - w.base) - w.tau) / h, 0.0), 1.0)
+        x[i] = min(max(_passed(w, times[min(first + i, last)], origin) / h, 0.0), 1.0)
     second, third, fourth = min(first + 1, last), min(first + 2, last), min(first + 3, last)
     for m in range(n + w.n_ledger):
         start, row = (w.y[m], w.polynomial[m]) if m < n else (w.q[m - n], w.q_polynomial[m - n])
@@ -101,28 +105,73 @@ def _correct_ledger(w: Any, h: float) -> None:
 
 
 @compiled
-def _polynomial_serves(w: Any, h: float) -> bool:
-    """Prepare the polynomials of state and ledger; True if that of the state is as accurate as the ends of the step."""
+def _probe_polynomial(w: Any, h: float) -> None:
+    """Prepare the polynomials of state and ledger, and find the error of that of the state midway between the stages,
+    where it is least accurate.
+    """
     keep_polynomial(w)
-    # Check the equations midway between the stages, where the polynomial is least accurate.
     put_inside(w, h, PROBE[w.member])
     filter_residual(w)
-    serves = _largest(w, 0.0) <= POLYNOMIAL_ERROR
-    if not serves:
-        find_noise(w)
-        serves = _largest(w, MAGNIFIED) <= POLYNOMIAL_ERROR
     if w.n_ledger > 0:
         _correct_ledger(w, h)
-    return serves
+
+
+@compiled
+def _write_by_parts(
+    w: Any, times: Any, outputs: Any, first: int, last: int, h: float, origin: float, parts: int
+) -> int:
+    """Write outputs from the polynomials of n equal parts of the step, up to a part in which that is not accurate;
+    return the next output.
+    """
+    start, size = w.tau, h / parts
+    if w.explicit == 0 and not factor_newton(w, size):
+        return first
+    for part in range(parts):
+        w.offset, w.contraction = part / parts, 1.0
+        if not repeat_step(w, size) < np.inf:
+            break
+        finish_step(w, size)
+        _probe_polynomial(w, size)
+        if not _largest(w, MAGNIFIED) <= PART_ERROR:
+            break
+        following = first
+        while following < last and (part + 1 == parts or _passed(w, times[following], origin) <= size):
+            following += 1
+        for i in range(first, following, 4):
+            write_four(w, times, outputs, i, following, size, origin)
+        first = following
+        if first == last:
+            break
+        end_of_step(w, size, w.y, w.ydot, w.q)
+        copy(w.rates[stage_count(w.member) - 1], w.rates[7])
+        w.tau = start + (part + 1) * size
+    w.tau, w.offset = start, 0.0
+    return first
+
+
+@compiled
+def _write_by_step(w: Any, times: Any, outputs: Any, i: int, h: float, origin: float) -> None:
+    """Write an output computed by a separate step of full order; if Newton's method fails, it stays as it is."""
+    size = _passed(w, times[i], origin)
+    w.contraction = 1.0
+    if not 0.0 < size < h or (w.explicit == 0 and not factor_newton(w, size)) or not repeat_step(w, size) < np.inf:
+        return
+    if w.n_ledger > 0:
+        integrate_ledger(w, size)
+    end_of_step(w, size, outputs[i], w.trial_dot, outputs[i, w.n :])
 
 
 @compiled
 def _restore_step(w: Any, h: float) -> None:
-    """Restore the main step after others were taken inside it: its stages, quadratures and factors."""
+    """Restore the main step after others were taken inside it: its start, stages, quadratures and factors, and the
+    correction of its polynomial.
+    """
+    s = stage_count(w.member)
     if w.explicit != 0:
         step_explicitly(w, h, np.inf)
-    for i in range(stage_count(w.member)):
+    for i in range(s):
         copy(w.z_last[i], w.z[i])
+    copy(w.z_last[s], w.correction)
     if w.n_ledger > 0:
         integrate_ledger(w, h)
     if w.explicit == 0:
@@ -131,13 +180,31 @@ def _restore_step(w: Any, h: float) -> None:
 
 @compiled
 def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: float, origin: float) -> None:
-    """Write states at times between the ends of the step, counted from an origin."""
-    if _polynomial_serves(w, h):
-        for i in range(first, last, 4):
-            write_four(w, times, outputs, i, last, h, origin)
+    """Write states at times in order between the ends of the step, counted from an origin."""
+    _probe_polynomial(w, h)
+    missed, s = _largest(w, 0.0), stage_count(w.member)
+    if missed > POLYNOMIAL_ERROR:
+        find_noise(w)
+        missed = _largest(w, MAGNIFIED)
+    for i in range(first, last, 4):
+        write_four(w, times, outputs, i, last, h, origin)
+    if missed <= POLYNOMIAL_ERROR:
         return
     theta, contraction, guessed, tries = w.theta, w.contraction, w.guess_error, w.newton_steps
     store_polynomial(w, h, 0.0)
+    copy(w.correction, w.z_last[s])  # a row that is free
+    # In components that follow others, the error of the polynomial goes with this power of the size.
+    parts = np.ceil((missed / PART_ERROR) ** (1.0 / s))
+    if parts <= FEW_PARTS:
+        copy(w.y, w.y_first)
+        copy(w.ydot, w.ydot_first)
+        copy(w.q, w.q_first)
+        copy(w.rates[7], w.rates_first)
+        first = _write_by_parts(w, times, outputs, first, last, h, origin, int(parts))
+        copy(w.y_first, w.y)
+        copy(w.ydot_first, w.ydot)
+        copy(w.q_first, w.q)
+        copy(w.rates_first, w.rates[7])
     for i in range(first, last):
         _write_by_step(w, times, outputs, i, h, origin)
     _restore_step(w, h)
@@ -225,13 +292,17 @@ def write_interior(w: Any, times: Any, states: Any, first: int, h: float) -> int
     parts, ratios = _parts(w, h, growth)
     if ratios > 0 and growth <= parts * np.expm1(np.log1p(growth) / ratios):
         ratios = 0  # equal parts of the time suffice where parts of its logarithm are longest
-    middle = first + max(parts - 1, 0)
-    last = middle + max(ratios - 1, 0)
+    last = first + max(parts - 1, 0) + max(ratios - 1, 0)
     if first < last <= times.shape[0]:
-        for i in range(first, middle):
-            times[i] = w.base + (w.tau + h * (i + 1 - first) / parts)
-        for i in range(middle, last):
-            times[i] = w.base + (w.tau + start * np.expm1(np.log1p(growth) * (i + 1 - middle) / ratios))
+        part = ratio = 1
+        for i in range(first, last):
+            by_time = h * part / parts if part < parts else np.inf
+            by_ratio = start * np.expm1(np.log1p(growth) * ratio / ratios) if ratio < ratios else np.inf
+            if by_time <= by_ratio:
+                part += 1
+            else:
+                ratio += 1
+            times[i] = w.base + (w.tau + min(by_time, by_ratio))
         _write_inside(w, times, states, first, last, h, 0.0)
         _add_booked(w, states, first, last)
         for i in range(first, last):

@@ -172,6 +172,17 @@ def estimate_again(w: Any, h: float) -> float:
 
 
 @compiled
+def repeat_step(w: Any, size: float) -> float:
+    """Repeat the step, or a part of it, with the size for which the matrices are factored and the full order of the
+    method; return the norm of its error, infinite if it fails.
+    """
+    if w.explicit != 0:
+        return float(step_explicitly(w, size, np.inf))
+    predict(w, size)
+    return float(estimate_error(w, size)) if solve_stages(w, size) == CONVERGED else np.inf
+
+
+@compiled
 def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) -> float:
     """Propose a step size by Gustafsson's predictive controller; h_last = 0 where there is no accepted step before.
 

@@ -181,6 +181,8 @@ MEMORY = {
     **_arrays("order", 4, 6, "core", kind=int),
     **_arrays("places", 4, "core", "core", kind=int),
     **_arrays("entries", 5, "core", kind=int),
+    # state and rates at the start of a step in parts
+    **_arrays("y_first ydot_first", "n"),
     # polynomials in Newton's form: the stored one, and those of state and ledger over the step
     **_arrays("z_polynomial polynomial", "n", 9),
     # four outputs as fractions of the step
@@ -194,8 +196,9 @@ MEMORY = {
     **_arrays("least largest", "n"),
     # ledger: present, trial, correction of its polynomial, probe; errors, turnover of the step, scale of the error
     # norm, largest so far, errors explained by the tolerance of the states; at the stages; rates there and,
-    # last, at the start
+    # last, at the start; present and rates at the start of a step in parts
     **_arrays("q q_trial q_correction q_probe q_error q_turnover q_scale q_largest q_explained", "n_ledger"),
+    **_arrays("q_first rates_first", "n_ledger"),
     **_arrays("q_stage", ROWS, "n_ledger"),
     **_arrays("rates", 8, "n_ledger"),
     # guards: present value, at the last two points, at the start of the step, at a probe; largest so far; slope
