@@ -159,15 +159,16 @@ def _conserved(coverages: Sequence[BondingVariable], reactions: Sequence[RateLaw
     ]
 
 
+def _taken(law: RateLaw) -> set[str]:
+    """Return the names of the coverages that a reaction takes."""
+    return {name for name, nu in law.stoichiometry().items() if nu < 0}
+
+
 def _refuse_many(rest: _Rest, interface: Interface) -> None:
     """Raise InputError if reactions have used up a species, and the state at rest depends on what they made of it."""
     names = {q.name for q, x in zip(rest.quantities, rest.x.tolist(), strict=True) if x > TRACE_COVERAGE}
     there = [coverage for coverage in interface.variables if coverage.name in names]
-    going = [
-        law
-        for law in interface.reactions
-        if not (law.one_way and {name for name, nu in law.stoichiometry().items() if nu < 0} - names)
-    ]
+    going = [law for law in interface.reactions if not (law.one_way and _taken(law) - names)]
     kept = [[weights.get(coverage.name, 0.0) for coverage in there] for weights in rest.conserved]
     if len(_conserved(there, going)) > np.linalg.matrix_rank(np.reshape(kept, (len(kept), len(there)))):
         ended = listed([law.label for law in interface.reactions if law not in going], 4)

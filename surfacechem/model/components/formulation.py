@@ -261,22 +261,26 @@ def _refuse_one_component(law: Friction) -> None:
             raise InputError(f"{name} varies with one component of the velocity, and this scene has two.", law.place)
 
 
+def _warn_of_static_friction(build: Build, law: Friction, bound: Friction) -> None:
+    """Add cautions for a limit of sticking below kinetic friction, which is unphysical: it is raised to that."""
+    given = {"p": ONE, **REST}  # 1 Pa stands for any pressure: coefficients are compared
+    static = build.variables.call(bound, bound.limit, given)
+    kinetic = build.variables.call(bound, bound.fast or bound.statement, given)
+    told = "it rises as sliding grows faster" if bound.fast else "sticking bears the latter"
+    if law.rest_exponent:
+        rise = where(getattr(bound, law.rest_exponent) < 1, static - kinetic, ONE)
+        steep = f"the friction of {law.title} rises from rest with an infinite slope, which no step resolves"
+        build.add(Caution(rise, f"{steep}: give a {law.rest_exponent} of 1 or more"))
+    if static != kinetic:
+        text = f"the static friction of {law.title} is below its sliding friction: {told}"
+        build.add(Caution(static - kinetic, text))
+
+
 def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:
     """Add the traction up to which a friction law sticks: its limit, or the kinetic friction at v = 0 if larger."""
     sticking = [slip.d for slip in build.motion.slips if slip.sticks]
     if sticking and bound.has_limit:
-        # A limit below kinetic friction is unphysical: it is raised to that, with a caution.
-        given = {"p": ONE, **REST}  # 1 Pa stands for any pressure: coefficients are compared
-        static = build.variables.call(bound, bound.limit, given)
-        kinetic = build.variables.call(bound, bound.fast or bound.statement, given)
-        told = "it rises as sliding grows faster" if bound.fast else "sticking bears the latter"
-        if law.rest_exponent:
-            rise = where(getattr(bound, law.rest_exponent) < 1, static - kinetic, ONE)
-            steep = f"the friction of {law.title} rises from rest with an infinite slope, which no step resolves"
-            build.add(Caution(rise, f"{steep}: give a {law.rest_exponent} of 1 or more"))
-        if static != kinetic:
-            text = f"the static friction of {law.title} is below its sliding friction: {told}"
-            build.add(Caution(static - kinetic, text))
+        _warn_of_static_friction(build, law, bound)
     for d in sticking:
         limits, at_rest, two = build.motion.stick_limits, {**own, **REST}, d is ACROSS and bound.transverse is not None
         borne = build.variables.call(bound, bound.transverse if two else bound.statement, at_rest)

@@ -81,9 +81,8 @@ def stages(build: Build) -> Iterator[Constraint | str]:
             modes, reason = {STAGE: symengine.Integer(i + 1), begun: build.t}, f"the stage {item.name} ends"
             guard = _left(build, item)
             edges.append(Edge(f"end of {item.name}", guard, reason, modes, ends_stage=True, when={STAGE: (i,)}))
-            if i == 0 and item.variable and build.at_start(guard) == 0:
-                told = f"the stage {item.name} waits until {_awaited(item)}, which it is from the start"
-                yield f"{told}: roundoff may decide when the stage ends. Give another value."
+            if i == 0 and item.variable:
+                yield from _caution(build, item, guard)
 
     def advancing(edge: Edge) -> dict[Expression, Expression]:
         """Return the new stage and its start time along an edge that stages wait for."""
@@ -95,6 +94,13 @@ def stages(build: Build) -> Iterator[Constraint | str]:
         return modes
 
     yield Constraint(registers=(STAGE_START,), edges=tuple(edges), resets=advancing)
+
+
+def _caution(build: Build, item: Stage, guard: Expression) -> Iterator[str]:
+    """Yield a caution if the first stage waits for a value that its variable has from the start."""
+    if build.at_start(guard) == 0:
+        told = f"the stage {item.name} waits until {_awaited(item)}, which it is from the start"
+        yield f"{told}: roundoff may decide when the stage ends. Give another value."
 
 
 def _refuse_unknown_event(build: Build, i: int, item: Stage) -> None:

@@ -261,10 +261,7 @@ class _Run:
             self.view.hold(start, y, ydot)
             self.margins, self.ledger_rates = self.view.margins(), self.view.ledger()
             self.guards.start(self.margins, self.restarts)
-            if not self.outputs and len(self.problem.times) and self.problem.times[0] <= start:
-                self.outputs.append(np.concatenate((self.y, self.ledger)))
-            if self.problem.record_steps and not self.steps:
-                self.steps.append((np.array([start]), self.y[None], self.ydot[None], self.ledger[None]))
+            self._record_start()
             stop = end if self.aim is None or self.aim <= start else self.aim
             if self.solver.keeps_longest:  # a limit of its steps has to be lifted by another start
                 stop = min(stop, start + FIRST_TOGETHER * self.view.growing_size(start, y[self.view.differential]))
@@ -279,6 +276,13 @@ class _Run:
             if over is not None and self.t < end:
                 return over
         return Status.FINISHED
+
+    def _record_start(self) -> None:
+        """Record the start of the run, once, among its outputs and steps."""
+        if not self.outputs and len(self.problem.times) and self.problem.times[0] <= self.t:
+            self.outputs.append(np.concatenate((self.y, self.ledger)))
+        if self.problem.record_steps and not self.steps:
+            self.steps.append((np.array([self.t]), self.y[None], self.ydot[None], self.ledger[None]))
 
     def _over_budget(self) -> Status | None:
         if self.count >= self.problem.max_steps:
