@@ -95,14 +95,21 @@ def _why_implicit(problem: Problem) -> str:
 
 
 def fastest_relaxation(program: Program, problem: Problem) -> float:
-    """Return the largest decay rate [1/s] of a small perturbation of the initial state; may be infinite."""
+    """Return the largest decay rate [1/s] of a small perturbation of the initial state, or a bound of it that is not
+    stiff; may be infinite.
+    """
     n, parameters = program.n, problem.parameters[0]
     inputs = np.concatenate([problem.segments[:1], problem.y0, np.zeros(n), parameters])
     assert program.rates is not None
     inputs[1 + n : 1 + 2 * n] = program.rates(inputs)
     K, M = program.derivatives(inputs)
     try:
-        growth = np.linalg.eigvals(np.linalg.solve(M, -K))
+        slopes = np.linalg.solve(M, -K)
+        # No eigenvalue exceeds this norm, which is found in a third of the time and is small enough as a rule.
+        norm = float((np.abs(slopes) @ problem.atol / problem.atol).max(initial=0.0))
+        if norm * problem.segments[-1] <= STIFF:
+            return norm
+        growth = np.linalg.eigvals(slopes)
     except (np.linalg.LinAlgError, ValueError):
         return np.inf
     return float(max(-growth.real.min(initial=0.0), 0.0)) if np.all(np.isfinite(growth)) else np.inf

@@ -658,10 +658,12 @@ class Model:
             )
         used.prepare()
         self.compile_seconds += PREPARATION.seconds - before
-        items = [
-            (each if each.solver == run.solver else replace(each, solver=run.solver), values, problem)
-            for (each, values), problem in zip(runs, problems, strict=True)
-        ]
+        first = runs[0][0]  # often the settings of all
+
+        def settled(each: Run) -> Run:
+            return run if each is first else each if each.solver == run.solver else replace(each, solver=run.solver)
+
+        items = [(settled(each), values, problem) for (each, values), problem in zip(runs, problems, strict=True)]
         # A limit in seconds applies to each run alone.
         groups = [[item] for item in items] if run.max_seconds else [items]
         return [done for group in groups for done in self._solve_together(used, group, threads)]
