@@ -214,6 +214,17 @@ def test_what_grows_from_below_the_tolerance_is_not_damped() -> None:
     np.testing.assert_allclose(result.outputs[:, 0], [grown / (1 + grown), 1.0], rtol=1e-2)
 
 
+def test_what_grows_by_another_from_below_the_tolerance_is_not_damped() -> None:
+    """A branching chain: y' = z f - 0.1 y + 1e-25 and z' = y f - 0.1 z with f = 1 - y - z grow by 0.9 from nothing."""
+    (y, z), (dy, dz) = se.symbols("y z"), se.symbols("dy dz")
+    rows = [dy - z * (1 - y - z) + y / 10 - 1e-25, dz - y * (1 - y - z) + z / 10]
+    program = compile_program(se.Symbol("t"), [y, z], [dy, dz], [], rows)
+    result = radau.solve(problem(program, [0.0, 0.0], [0.0, 1e4], 1e-6, atol=1e-12, times=[50.0, 1e4]))
+    # Half of the source feeds the mode that grows.
+    grown = 1e-25 / 2 / 0.9 * np.exp(0.9 * 50.0)
+    np.testing.assert_allclose(result.outputs, [[grown, grown], [0.45, 0.45]], rtol=2e-2)
+
+
 def test_vanishing_capacity_ends_at_zero_temperature() -> None:
     """C T / T0 T' = -Q: T = T0 sqrt(1 - 2 t / tau) reaches zero with infinite slope."""
     t, temperature, rate = se.symbols("t T dT")

@@ -73,7 +73,7 @@ class View(Evaluation):
         return self.program.derivatives(self.row(t, y, ydot))
 
     def growing_size(self, t: float, x: Array) -> float:
-        """Return the step in which a state below its tolerance grows at most e-fold by its own derivative.
+        """Return the step in which states below their tolerances grow at most e-fold, by one another's derivatives.
 
         No error counts there, and implicit methods damp what grows much faster: they would never leave an unstable
         equilibrium. The compiled stepper keeps to the same.
@@ -85,9 +85,14 @@ class View(Evaluation):
         states[:, self.free], states[:, self.algebraic] = x, self.guess
         states[1 + np.arange(len(below)), self.free[below]] += sizes
         rates = self.many(np.full(len(states), t), states)[1][:, self.free[below]]
+        slopes = ((rates[1:] - rates[0]) / sizes[:, None]).T
         driven = (x[below] != 0) | (rates[0] != 0)  # what is exactly zero, with zero rate, does not grow
-        fastest = float(np.max(((np.diagonal(rates[1:]) - rates[0]) / sizes)[driven], initial=0.0))
-        return 1 / fastest if 0 < fastest < np.inf else np.inf
+        for _ in below:
+            driven |= (slopes[:, driven] != 0).any(axis=1)
+        if not np.all(np.isfinite(slopes)):
+            return np.inf
+        fastest = float(np.linalg.eigvals(slopes[driven][:, driven]).real.max(initial=0.0))
+        return 1 / fastest if fastest > 0 else np.inf
 
     def reduced_rates(self, t: float, x: Array) -> Array:
         """Return the right-hand side f of the reduced system."""

@@ -54,7 +54,7 @@ from surfacechem.solve.radau.linear import PIVOT_PART
 from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
 from surfacechem.solve.radau.step import CONTRACTING, LEAST_CONVERGENT, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.work import JACOBIAN, RATES, RESIDUAL, compiled, evaluate, evaluate_at, weighted_sums
-from surfacechem.tolerances import EPS, NEGLIGIBLE, NEWTON_EPS, TINY, UNEQUAL
+from surfacechem.tolerances import EPS, FORMULA_EPS, NEGLIGIBLE, NEWTON_EPS, TINY, UNEQUAL
 
 MEMBER, STAGES = 1, 5
 """Member of the family in these steps, and its number of stages."""
@@ -512,14 +512,27 @@ def limit_size(w: Any) -> None:
 
 @compiled
 def limit_growth(w: Any) -> None:
-    """Limit the next step such that a state below its tolerance, where no error counts, grows at most e-fold by its own
-    derivative.
+    """Limit the next step such that states below their tolerances, where no error counts, grow at most e-fold, each by
+    its own derivative or two by one another's.
     """
     fastest = same(0.0)
     for m in range(w.n):
         driven = (lanes(w.y[m]) > 0.0) | (lanes(w.y[m]) < 0.0) | (absolute(lanes(w.k[0, m])) > 0.0)
         grows = driven & (absolute(lanes(w.y[m])) < w.atol[m])
-        fastest = where(grows, larger(fastest, lanes(w.jacobian[m, m])), fastest)
+        if any_lane(grows):
+            first = lanes(w.jacobian[m, m])
+            fastest = where(grows, larger(fastest, first), fastest)
+            for other in range(w.n):
+                if other == m:
+                    continue
+                second = lanes(w.jacobian[other, other])
+                both = lanes(w.jacobian[other, m]) * lanes(w.jacobian[m, other])
+                pair = grows & (both > 0.0) & (absolute(lanes(w.y[other])) < w.atol[other])
+                half = (first - second) / 2.0
+                root = square_root(where(pair, half * half + both, 0.0))
+                growth = (first + second) / 2.0 + root
+                beyond = growth > FORMULA_EPS * (absolute(first) + absolute(second) + root)
+                fastest = where(pair & beyond, larger(fastest, growth), fastest)
     put(w.following, smaller(lanes(w.following), where(fastest > 0.0, 1.0 / fastest, np.inf)))
 
 

@@ -63,7 +63,7 @@ from surfacechem.solve.radau.work import (
     row_of,
     set_inputs,
 )
-from surfacechem.tolerances import EPS, LEAST_WEIGHT, NEGLIGIBLE, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY, ULPS
+from surfacechem.tolerances import EPS, FORMULA_EPS, LEAST_WEIGHT, NEGLIGIBLE, NEWTON_EPS, RUN_EPS, SQRT_EPS, TINY, ULPS
 
 # The first two as in RADAU5 (Hairer & Wanner II, IV.8).
 SAFETY = 0.9
@@ -219,8 +219,8 @@ def choose_member(w: Any, slowest: float) -> bool:
 
 @compiled
 def growing_size(w: Any) -> float:
-    """Step size in which a state below its tolerance, where no error counts, grows at most e-fold by its own
-    derivative.
+    """Step size in which states below their tolerances, where no error counts, grow at most e-fold, each by its own
+    derivative or two by one another's.
 
     The method damps a state that grows much faster, and would never leave an unstable equilibrium. A state that is
     exactly zero with zero rate does not grow.
@@ -232,8 +232,25 @@ def growing_size(w: Any) -> float:
     for j in range(mass.shape[0]):
         driven = w.y[j] != 0.0 or w.ydot[j] != 0.0
         if driven and mass[j, j] != 0.0 and abs(w.y[j]) < w.atol[j]:
-            fastest = max(fastest, -stiffness[j, j] / mass[j, j])
+            own = -stiffness[j, j] / mass[j, j]
+            fastest = max(fastest, own)
+            # As in branching chains; where amounts feed one another all grow no slower than two of them.
+            for i in range(mass.shape[0]):
+                if i != j and stiffness[i, j] * stiffness[j, i] > 0 and mass[i, i] != 0 and abs(w.y[i]) < w.atol[i]:
+                    both = stiffness[i, j] / mass[i, i] * (stiffness[j, i] / mass[j, j])
+                    fastest = max(fastest, _growth_of_two(own, -stiffness[i, i] / mass[i, i], both))
     return 1.0 / fastest if fastest > 0.0 else np.inf
+
+
+@compiled
+def _growth_of_two(first: float, second: float, both: float) -> float:
+    """Growth rate of two states with these derivatives of their rates by themselves, and this product of those by one
+    another; zero within roundoff, as of a fast exchange.
+    """
+    half = (first - second) / 2
+    root = np.sqrt(half * half + both)
+    growth = (first + second) / 2 + root
+    return growth if growth > FORMULA_EPS * (abs(first) + abs(second) + root) else 0.0
 
 
 @compiled
