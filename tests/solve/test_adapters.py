@@ -59,6 +59,22 @@ def test_what_grows_from_below_the_tolerance_is_not_damped(name: str) -> None:
     assert result.y[0] == pytest.approx(1.0, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("name", "rates"),
+    [
+        *((name, (3.9e13, 4.2e12, 7.9e11, 1.9e12)) for name in ("cantera", "cvode")),
+        ("bdf", (4.3e12, 6.4e13, 2.8e13, 1e11)),
+    ],
+)
+def test_traces_in_fast_exchange_do_not_grow_by_the_roundoff_of_their_rates(name: str, rates) -> None:
+    x, dx = se.symbols("x dx")
+    f, g = rates[0] * Y - rates[1] * Z, rates[2] * Z - rates[3] * x
+    program = compile_program(T, [Y, Z, x], [DY, DZ, dx], [], [DY + f, DZ - f + g, dx - g])
+    result = solver(name).solve(problem(program, [1e-20] * 3, [0.0, 1e6], 1e-6, atol=1e-10))
+    assert result.status.success
+    assert result.counters.steps < 100
+
+
 def steep(name: str, row, start: float, end: float, **more):
     """A run of y from 1 on, of which a library keeps the steps."""
     program = scalar(row, 2 * Y * DY)

@@ -13,7 +13,7 @@ from surfacechem.solve.adapters.dense_step import NODES, WEIGHTS, DenseStep, Gua
 from surfacechem.solve.adapters.evaluation import Evaluation, Evaluations
 from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
-from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
+from surfacechem.tolerances import FORMULA_EPS, NEGLIGIBLE, SQRT_EPS, ULPS
 
 ENTROPY_GROUP = 1
 """Group of the ledger's entropy accounts."""
@@ -92,7 +92,8 @@ class View(Evaluation):
         if not np.all(np.isfinite(slopes)):
             return np.inf
         fastest = float(np.linalg.eigvals(slopes[driven][:, driven]).real.max(initial=0.0))
-        return 1 / fastest if fastest > 0 else np.inf
+        # That of a fast exchange is zero within roundoff.
+        return 1 / fastest if fastest > FORMULA_EPS * np.abs(slopes).max() else np.inf
 
     def reduced_rates(self, t: float, x: Array) -> Array:
         """Return the right-hand side f of the reduced system."""
