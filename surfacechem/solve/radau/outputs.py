@@ -120,8 +120,8 @@ def _probe_polynomial(w: Any, h: float) -> None:
 def _write_by_parts(
     w: Any, times: Any, outputs: Any, first: int, last: int, h: float, origin: float, parts: int
 ) -> int:
-    """Write outputs from the polynomials of n equal parts of the step, up to a part in which that is not accurate;
-    return the next output.
+    """Write outputs from the polynomials of equal parts of the step, up to a part in which that is not accurate; return
+    the number of the next output. The start of the step is moved on.
     """
     start, size = w.tau, h / parts
     if w.explicit == 0 and not factor_newton(w, size):
@@ -163,8 +163,8 @@ def _write_by_step(w: Any, times: Any, outputs: Any, i: int, h: float, origin: f
 
 @compiled
 def _restore_step(w: Any, h: float) -> None:
-    """Restore the main step after others were taken inside it: its start, stages, quadratures and factors, and the
-    correction of its polynomial.
+    """Restore the main step after others were taken inside it: its stages, quadratures and factors, and the correction
+    of its polynomial.
     """
     s = stage_count(w.member)
     if w.explicit != 0:
