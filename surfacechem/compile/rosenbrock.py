@@ -20,7 +20,7 @@ from llvmlite import ir
 from surfacechem.compile import PREPARATION
 from surfacechem.compile.objectcode import engine
 from surfacechem.compile.vectors import LANES, LaneFunction, by_vector, entry, function_body, number, object_code
-from surfacechem.tolerances import EPS, LINEAR_RTOL, UNEQUAL
+from surfacechem.tolerances import EPS, LINEAR_RTOL, NEWTON_EPS, UNEQUAL
 
 _GIVEN = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
 GAMMA, NODES, CHANGES, _COUPLINGS, _TIME_PARTS, _DENSE = (
@@ -145,7 +145,8 @@ class _Step:
         Given are what the equations were open by before the last increments, the changes of the rates by these, and
         the rates at the end. A gap is no error if states that move by their weights change the rate by more.
         """
-        b, norm, soft, left = self.builder, number(0.0), [], []
+        # What roundoff closes counts for nothing.
+        b, norm, soft, left = self.builder, number(NEWTON_EPS), [], []
         unit = b.fmul(number(GAMMA), self.h)
         per_unit = b.fdiv(number(1.0), unit)
         for increment, weight in zip(last, self.units, strict=True):

@@ -298,7 +298,7 @@ def _are_open(w: Any, residual: Any) -> Any:
 @compiled
 def _are_astray(w: Any, norm: Any) -> Any:
     """Mask of lanes in which Newton's method ends at a wrong state, because equations have become much softer than its
-    matrix: its last corrections, of this norm, are small and close no gap.
+    matrix: its last corrections, of this norm, are small and close no gap, or by roundoff alone.
 
     The equations at the end of the step are then open by more than states that move by their weights change them. How
     far they were open before the last correction is in ``error``.
@@ -312,7 +312,7 @@ def _are_astray(w: Any, norm: Any) -> Any:
             rate, before = lanes(w.rhs[m]), lanes(w.error[m])
             left = lanes(w.k[STAGES, m]) - rate
             put(w.imaginary[m], rate)
-            put(w.rhs[m], where(norm * absolute(left) > absolute(left - before), left, 0.0))
+            put(w.rhs[m], where(larger(norm, NEWTON_EPS) * absolute(left) > absolute(left - before), left, 0.0))
         astray = astray & _are_open(w, w.rhs)
     if any_lane(astray):
         _move_states(w)

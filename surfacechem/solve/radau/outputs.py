@@ -121,11 +121,15 @@ def _write_by_parts(
     w: Any, times: Any, outputs: Any, first: int, last: int, h: float, origin: float, parts: int
 ) -> int:
     """Write outputs from the polynomials of equal parts of the step, up to a part in which that is not accurate; return
-    the number of the next output. The start of the step is moved on.
+    the number of the next output.
     """
     start, size = w.tau, h / parts
     if w.explicit == 0 and not factor_newton(w, size):
         return first
+    copy(w.y, w.y_first)
+    copy(w.ydot, w.ydot_first)
+    copy(w.q, w.q_first)
+    copy(w.rates[7], w.rates_first)
     for part in range(parts):
         w.offset, w.contraction = part / parts, 1.0
         if not repeat_step(w, size) < np.inf:
@@ -146,6 +150,10 @@ def _write_by_parts(
         copy(w.rates[stage_count(w.member) - 1], w.rates[7])
         w.tau = start + (part + 1) * size
     w.tau, w.offset = start, 0.0
+    copy(w.y_first, w.y)
+    copy(w.ydot_first, w.ydot)
+    copy(w.q_first, w.q)
+    copy(w.rates_first, w.rates[7])
     return first
 
 
@@ -196,15 +204,7 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
     # In components that follow others, the error of the polynomial goes with this power of the size.
     parts = np.ceil((missed / PART_ERROR) ** (1.0 / s))
     if parts <= FEW_PARTS:
-        copy(w.y, w.y_first)
-        copy(w.ydot, w.ydot_first)
-        copy(w.q, w.q_first)
-        copy(w.rates[7], w.rates_first)
         first = _write_by_parts(w, times, outputs, first, last, h, origin, int(parts))
-        copy(w.y_first, w.y)
-        copy(w.ydot_first, w.ydot)
-        copy(w.q_first, w.q)
-        copy(w.rates_first, w.rates[7])
     for i in range(first, last):
         _write_by_step(w, times, outputs, i, h, origin)
     _restore_step(w, h)
