@@ -32,11 +32,7 @@ USUAL = {
 MORE_UNITS = (
     {"r": "m"}
     | dict.fromkeys(("T_0", "T", "T_from", "T_to", "T_1", "T_2", "x"), "K")
-    | {
-        "mu": "J",
-        "N_c": "1/m^2",
-        "r": "m",
-    }
+    | {"mu": "J", "N_c": "1/m^2", "r": "m"}
 )
 SIGNED = {"v", "v_2", "v_n", "v_t", "g_n", "g_t", "u_t", "f", "mu", "t_n", "dmu_dphi", "direction", "direction_2"}
 AT = {"times": 1.0, "pressures": 1e5, "gaps": 1e-9}

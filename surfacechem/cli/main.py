@@ -101,9 +101,7 @@ def new(
 
 
 @app.command(epilog=EXIT_CODES)
-def cases(
-    name: Annotated[str | None, Argument(help="Print this case.", autocompletion=case_names)] = None,
-) -> None:
+def cases(name: Annotated[str | None, Argument(help="Print this case.", autocompletion=case_names)] = None) -> None:
     """List the cases that come with the package, or print one."""
     from surfacechem.runs.listing import case_table, case_text
 
@@ -322,11 +320,7 @@ def sweep(
     ] = None,
     only: Annotated[
         str | None,
-        Option(
-            "--only",
-            metavar="STATUS",
-            help="Repeat runs of the store with this status, failed say, beside it.",
-        ),
+        Option("--only", metavar="STATUS", help="Repeat runs of the store with this status, failed say, beside it."),
     ] = None,
     changes: Changes = None,
     talk: Verbose = None,

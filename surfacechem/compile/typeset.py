@@ -244,9 +244,12 @@ def _unguarded(values: Sequence[Any], conditions: Sequence[Any]) -> Expression:
     first, condition = values[0], conditions[0]
     if condition == False:  # noqa: E712 - an expression, not a flag
         return _unguarded(values[1:], conditions[1:])
-    if len({*values}) == 1 or condition == True or _is_cap(condition):  # noqa: E712
+    if len({*values}) == 1 or condition == True:  # noqa: E712
         return first
     low, high = condition.args
+    # A cap keeps an exponent or a logarithm within the floating-point range.
+    if (high.is_Number and float(high) in EXPONENT_CAPS) or (low.is_Number and float(low) in FLOORS):
+        return first
     if [*values] == [1, -1, 0]:
         return symengine.sign(high)
     if len(values) == 2 and (plain := _without_choice(first, values[1], low, high)) is not None:
@@ -267,12 +270,6 @@ def _without_choice(first: Any, other: Any, low: Any, high: Any) -> Expression |
     if low == 0 and not other.free_symbols and high.free_symbols <= first.free_symbols:  # a divisor, a base of a power
         return first.xreplace({symengine.Max(0, high): high})
     return None
-
-
-def _is_cap(condition: Any) -> bool:
-    """True if a condition keeps an exponent or a logarithm within the floating-point range."""
-    low, high = condition.args
-    return (high.is_Number and float(high) in EXPONENT_CAPS) or (low.is_Number and float(low) in FLOORS)
 
 
 def _are_equal(one: Expression, other: Expression) -> bool:

@@ -219,9 +219,7 @@ class MechanismSection(Section):
     phase: str | None = key(Text(), "the phase, where there are several")
     bonds: Sequence[str] = key(ListOf(Text()), "species that count as bonds", ())
     neighbours: Mapping[str, NeighbourSection] = key(
-        Entries(others=Nested(NeighbourSection)),
-        "states in which the phases beside the surface are held, by name",
-        {},
+        Entries(others=Nested(NeighbourSection)), "states in which the phases beside the surface are held, by name", {}
     )
     species: Tree | None = key(
         Deferred(Entries(others=Entries(others=ByShape(amount("1"), NUMBERS)))), "other numbers of species, by name"

@@ -21,15 +21,7 @@ from surfacechem.documents.cache_folder import version
 from surfacechem.errors import InputError, refuse_unknown
 from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
-from surfacechem.results.netcdf import (
-    CONVENTIONS,
-    TABLES,
-    Column,
-    Data,
-    dataset_path,
-    save,
-    save_table,
-)
+from surfacechem.results.netcdf import CONVENTIONS, TABLES, Column, Data, dataset_path, save, save_table
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Trajectory
 

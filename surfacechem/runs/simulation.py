@@ -267,13 +267,9 @@ class Simulation:
         if settings.solver == AUTO:
             trajectory, estimate = verified(trajectory)
         case = chosen.case
-
-        def judged() -> Judgement:
-            return chosen._judged(trajectory, self._unused(values), error, estimate, errors)
-
         return Solution(
             trajectory,
-            judge=judged,
+            judge=partial(chosen._judged, trajectory, self._unused(values), error, estimate, errors),
             case_run=case.run,
             asked=settings,
             surface=case.scene.surface,
@@ -466,11 +462,7 @@ class Simulation:
         return self.sweep_plan(self.plan(over, until, sample, combine), changes, threads)
 
     def sweep_plan(
-        self,
-        plan: Plan,
-        changes: Overrides | None = None,
-        threads: int | None = None,
-        run: Run | None = None,
+        self, plan: Plan, changes: Overrides | None = None, threads: int | None = None, run: Run | None = None
     ) -> SweepSolution:
         """Run a plan with values in SI, with all runs in memory; ``run`` replaces the settings of the case."""
         from surfacechem.format.sections import MOST_RUNS

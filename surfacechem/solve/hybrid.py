@@ -19,18 +19,7 @@ from numpy.typing import NDArray
 
 from surfacechem.model.system import START
 from surfacechem.quantities import GAPS
-from surfacechem.solve.contract import (
-    Array,
-    Counters,
-    Events,
-    Index,
-    Points,
-    Problem,
-    Result,
-    Solver,
-    States,
-    Status,
-)
+from surfacechem.solve.contract import Array, Counters, Events, Index, Points, Problem, Result, Solver, States, Status
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.instant import ENDLESS, MANY_REBOUNDS, MISSED_CLOSING, SAME_MOMENT, Instant
 from surfacechem.solve.jumps import Jump, Jumper

@@ -25,15 +25,7 @@ from surfacechem.quantities import VELOCITIES
 from surfacechem.solve.contract import Array, EdgeTables, Index
 from surfacechem.solve.equilibria import BALANCED, Equilibria, FoldPoint, Folds, Point, compiled, formulas, rate_of
 from surfacechem.solve.jump_heat import JumpHeat, LoadPath, LoadStep
-from surfacechem.solve.radau.stepper import (
-    BONDS,
-    ENTROPY_OUT,
-    HEAT_OUT,
-    NOT_BOOKED,
-    PRODUCED,
-    RELEASED,
-    WORK,
-)
+from surfacechem.solve.radau.stepper import BONDS, ENTROPY_OUT, HEAT_OUT, NOT_BOOKED, PRODUCED, RELEASED, WORK
 from surfacechem.tolerances import FEW_EPS, GAP_EPS, RUN_EPS
 
 ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible"

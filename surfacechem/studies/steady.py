@@ -211,7 +211,10 @@ class _Rest:
             found = self._root(start := reached.result.y[self.evaluation.free])
             if found is not None and np.all(np.abs(found - start) <= NEGLIGIBLE * np.abs(found) + run.rtol):
                 self.x, self.largest = found, np.abs(reached.outputs).max(axis=0)
-                if not 0 < self._growth * self.time < LONGEST_GROWTH:
+                growth = np.linalg.eigvals(self._slopes(self.rates, found) / self._sizes(found)[:, None])
+                fastest = float(growth.real.max())
+                grows = fastest > CONSERVED_RATE * float(np.abs(growth).max())  # beyond rounding
+                if not (grows and fastest * self.time < LONGEST_GROWTH):
                     return
             self.time *= LONGER_BY
         raise InputError(f"the case did not reach a steady state within {self.time / LONGER_BY:.3g} s.")
@@ -275,13 +278,6 @@ class _Rest:
             if np.all(np.abs(step) <= RUN_EPS * self._sizes(x) + TRACE_COVERAGE):
                 return x
         return None
-
-    @property
-    def _growth(self) -> float:
-        """The rate [1/s] at which disturbances grow at the root; 0 where all decay, or none beyond rounding."""
-        rates = np.linalg.eigvals(self._slopes(self.rates, self.x) / self._sizes(self.x)[:, None])
-        fastest = float(rates.real.max())
-        return fastest if fastest > CONSERVED_RATE * float(np.abs(rates).max()) else 0.0
 
     def _slopes(self, of: Callable[[Array], Array], x: Array) -> Array:
         """Return the derivatives of the rates, or of the energy, by relative changes of the states."""

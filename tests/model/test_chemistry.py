@@ -157,11 +157,7 @@ def run(folder, potential, load="", more=""):
 
 @pytest.mark.parametrize(
     ("energy", "expected"),
-    [
-        ("K_0: 1 mJ/m^2", "exothermic"),
-        ("K_2: 1 mJ/m^2", "endothermic"),
-        ("K_1: 1 mJ/m^2", "isothermic"),
-    ],
+    [("K_0: 1 mJ/m^2", "exothermic"), ("K_2: 1 mJ/m^2", "endothermic"), ("K_1: 1 mJ/m^2", "isothermic")],
 )
 def test_the_class_of_a_reaction(energy, expected, tmp_path):
     """Bonds form in all of them, by the affinity; the heat that keeps the temperatures says the class."""

@@ -220,10 +220,7 @@ def test_an_exact_solution_with_parameters_of_its_own_is_of_the_scene_as_written
     simulation = surfacechem.load("slow-passage")
     why = "does not apply to this scene: it is given with delta_w, and the scene was changed"
     changed = simulation.run({"loading.w_n": w_n * (1 + 1e-9)})
-    for accuracy in (
-        changed.accuracy,
-        simulation.sweep({"loading.w_n": [w_n, w_n * (1 + 1e-9)]}).accuracy,
-    ):
+    for accuracy in (changed.accuracy, simulation.sweep({"loading.w_n": [w_n, w_n * (1 + 1e-9)]}).accuracy):
         assert accuracy.source.startswith("estimate")
         assert accuracy.source.endswith(why)
     assert "g_n_exact" not in changed.dataset

@@ -399,10 +399,7 @@ def test_a_cluster_changes_no_byte_even_where_a_worker_is_killed(whole, tmp_path
     """Workers that share this process are there at once, but cannot be killed."""
     distributed = pytest.importorskip("distributed")
     workers = {"n_workers": 2, "threads_per_worker": 1, "processes": killed}
-    with (
-        distributed.LocalCluster(**workers, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
-    ):
+    with distributed.LocalCluster(**workers, dashboard_address=None) as cluster, distributed.Client(cluster) as client:
         victim = next(iter(client.run(os.getpid).values()))
         told = []
 

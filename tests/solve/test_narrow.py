@@ -176,8 +176,7 @@ def test_a_step_is_held_against_the_equations_between_its_stages(h, method):
 
 
 @pytest.mark.parametrize(
-    ("rate", "ledger", "looked"),
-    [(T - Y, 1 / Y, False), (T - Y, se.exp(-Y), True), (T - Y, Y**5, True)],
+    ("rate", "ledger", "looked"), [(T - Y, 1 / Y, False), (T - Y, se.exp(-Y), True), (T - Y, Y**5, True)]
 )
 def test_explicit_steps_are_held_against_equations_that_may_be_brief(rate, ledger, looked):
     """A product of few states is not brief, nor is the inverse of one that hardly changes."""

@@ -322,7 +322,12 @@ class _Run:
             most = min(TOGETHER_GROWTH * most, largest)
             inside = self._inside(steps, min(float(steps.times[-1]), end))
             if self.t == start:
-                self._check_first(inside)
+                # A step far longer than the transient it starts in may end on another solution, which its error test
+                # does not detect.
+                moved = np.abs(self.ydot) * (inside.times[1] - start)
+                seen = np.abs(self.y) + np.abs(inside.y[-1, 0]) + self.problem.atol
+                if np.any((moved > LONGEST_FIRST * seen)[self.view.differential]):
+                    raise StepError("the first step is longer than the layer it starts in")
             first, count = 0, len(steps.times) - 1
             while first < count:
                 margins = inside.margins[:, first:]  # reductions are fastest along the first axis
@@ -432,16 +437,6 @@ class _Run:
         state = (x, np.zeros_like(x)) if self.plain else self._state(DenseStep(t, t, lambda _: x), t)
         self.view.hold(t, *state, whole=not self.problem.program.plain_margins)
         return self.view.margins()
-
-    def _check_first(self, inside: _Inside) -> None:
-        """Raise StepError if the first step is far longer than the transient it starts in.
-
-        Such a step may end on another solution, which its error test does not detect.
-        """
-        moved = np.abs(self.ydot) * (inside.times[1] - self.t)
-        seen = np.abs(self.y) + np.abs(inside.y[-1, 0]) + self.problem.atol
-        if np.any((moved > LONGEST_FIRST * seen)[self.view.differential]):
-            raise StepError("the first step is longer than the layer it starts in")
 
     def _adds_up(self, inside: _Inside, factor: float) -> NDArray[np.bool_]:
         """Return a mask of steps whose integrated rates equal the increment within ``factor`` tolerances.

@@ -110,12 +110,18 @@ def norm_of(w: Any, row: Any) -> Any:
 
 
 @compiled
+def _tolerance(w: Any, m: int) -> Any:
+    """The tolerance of a state over the step."""
+    size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
+    return larger(w.rtol * size + w.atol[m], LEAST_WEIGHT)
+
+
+@compiled
 def error_norm(w: Any, errors: Any) -> Any:
     """The maximum norm of errors of the states at the end of the step, relative to their tolerances over the step."""
     norm = same(0.0)
     for m in range(w.n):
-        largest = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        size = absolute(lanes(errors[m])) / larger(w.rtol * largest + w.atol[m], LEAST_WEIGHT)
+        size = absolute(lanes(errors[m])) / _tolerance(w, m)
         norm = where(size <= norm, norm, size)  # not larger(): NaN must be seen
     return norm
 
@@ -182,8 +188,7 @@ def try_step(w: Any) -> None:
         put(w.y_new[m], lanes(w.y[m]) + h * lanes(w.change[m]))
         blank = blank + 0.0 * lanes(w.coarse[m])  # NaN where an error is NaN, which comparisons would lose
     for m in range(w.n):
-        size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        unit = 1.0 / larger(w.rtol * size + w.atol[m], LEAST_WEIGHT)
+        unit = 1.0 / _tolerance(w, m)
         error = absolute(h * lanes(w.coarse[m])) * unit
         largest = where(error <= largest, largest, error)
         second = larger(second, absolute(h * lanes(w.fine[m])) * unit)
@@ -273,11 +278,7 @@ def prepare_checks(w: Any) -> None:
     """Set the allowed defect of the rate of each column, and the coefficients of the slope of the dense output."""
     h = lanes(w.h)
     for m in range(w.n):
-        size = larger(absolute(lanes(w.y[m])), absolute(lanes(w.y_new[m])))
-        put(
-            w.allowed[m],
-            MAX_DEFECT * tables.GAMMA[DENSEST] * w.loose * larger(w.rtol * size + w.atol[m], LEAST_WEIGHT) / h,
-        )
+        put(w.allowed[m], MAX_DEFECT * tables.GAMMA[DENSEST] * w.loose * _tolerance(w, m) / h)
     for m in range(w.n_ledger):
         put(w.allowed[w.n + m], same(np.inf))  # an account without a group only has to be finite
     for group in range(N_GROUPS):

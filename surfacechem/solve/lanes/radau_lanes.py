@@ -411,19 +411,6 @@ def _error_norm(w: Any) -> Any:
 
 
 @compiled
-def _explain(w: Any) -> None:
-    """Set the part of each quadrature error that an error of the states within their tolerance causes, as in single
-    runs: without it a rate of states far below their tolerance would be held against itself.
-    """
-    h = lanes(w.h)
-    _put_stage(w, STAGES - 1)
-    _move_states(w)
-    evaluate(w, RATES, w.rates)
-    for m in range(w.n, w.columns):
-        put(w.change[m], h * absolute(lanes(w.rates[m]) - lanes(w.k[STAGES, m])))
-
-
-@compiled
 def _ledger_norm(w: Any) -> Any:
     """The norm of the quadrature errors, less what is explained (``change``), in units of what is allowed."""
     h, norm = lanes(w.h), same(0.0)
@@ -460,7 +447,13 @@ def _integrate_ledger(w: Any) -> Any:
     norm = _ledger_norm(w)
     counts = norm > NEGLIGIBLE
     if any_lane(counts):
-        _explain(w)
+        # As in single runs, less the part that an error of the states within their tolerance causes: without it a rate
+        # of states far below their tolerance would be held against itself.
+        _put_stage(w, STAGES - 1)
+        _move_states(w)
+        evaluate(w, RATES, w.rates)
+        for m in range(w.n, w.columns):
+            put(w.change[m], h * absolute(lanes(w.rates[m]) - lanes(w.k[STAGES, m])))
         norm = where(counts, _ledger_norm(w), norm)
     blank = same(0.0)
     for m in range(w.n, w.columns):

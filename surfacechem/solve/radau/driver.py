@@ -28,16 +28,7 @@ from surfacechem.solve.radau.step import (
     restart,
     store_polynomial,
 )
-from surfacechem.solve.radau.stepper import (
-    ARCS,
-    END,
-    EVENTS,
-    FIRST_COUNTER,
-    INSIDE,
-    OUTPUTS,
-    RECORDS,
-    RETURNS,
-)
+from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, INSIDE, OUTPUTS, RECORDS, RETURNS
 from surfacechem.solve.radau.work import (
     MARGINS,
     any_true,

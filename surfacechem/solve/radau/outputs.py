@@ -20,12 +20,7 @@ from surfacechem.solve.radau.dense import (
     scan_step,
 )
 from surfacechem.solve.radau.explicit import step_explicitly
-from surfacechem.solve.radau.newton import (
-    end_of_step,
-    factor_newton,
-    nested_four,
-    stage_count,
-)
+from surfacechem.solve.radau.newton import end_of_step, factor_newton, nested_four, stage_count
 from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
 from surfacechem.solve.radau.step import filter_residual, repeat_step, store_polynomial
 from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE, SCANNED
@@ -92,28 +87,23 @@ def write_four(w: Any, times: Any, outputs: Any, first: int, end: int, h: float,
 
 
 @compiled
-def _correct_ledger(w: Any, h: float) -> None:
-    """Add the next term of the ledger's polynomial, from the defect of its rates at the probe."""
-    k = w.member
-    probe_ledger(w, h)
-    for m in range(w.n_ledger):
-        defect = w.q_probe[m] - PROBE_RATE[k, 7] * w.rates[7, m]
-        for i in range(stage_count(k)):
-            defect -= PROBE_RATE[k, i] * w.rates[i, m]
-        for i in range(stage_count(k) + 2):
-            w.q_polynomial[m, i] += PROBE_SHAPE[k, i] * (h * defect)
-
-
-@compiled
 def _probe_polynomial(w: Any, h: float) -> None:
     """Prepare the polynomials of state and ledger, and find the error of that of the state midway between the stages,
     where it is least accurate.
     """
+    k, s = w.member, stage_count(w.member)
     keep_polynomial(w)
-    put_inside(w, h, PROBE[w.member])
+    put_inside(w, h, PROBE[k])
     filter_residual(w)
     if w.n_ledger > 0:
-        _correct_ledger(w, h)
+        probe_ledger(w, h)
+    # The next term of the ledger's polynomial, from the defect of its rates at the probe.
+    for m in range(w.n_ledger):
+        defect = w.q_probe[m] - PROBE_RATE[k, 7] * w.rates[7, m]
+        for i in range(s):
+            defect -= PROBE_RATE[k, i] * w.rates[i, m]
+        for i in range(s + 2):
+            w.q_polynomial[m, i] += PROBE_SHAPE[k, i] * (h * defect)
 
 
 @compiled
@@ -170,23 +160,6 @@ def _write_by_step(w: Any, times: Any, outputs: Any, i: int, h: float, origin: f
 
 
 @compiled
-def _restore_step(w: Any, h: float) -> None:
-    """Restore the main step after others were taken inside it: its stages, quadratures and factors, and the correction
-    of its polynomial.
-    """
-    s = stage_count(w.member)
-    if w.explicit != 0:
-        step_explicitly(w, h, np.inf)
-    for i in range(s):
-        copy(w.z_last[i], w.z[i])
-    copy(w.z_last[s], w.correction)
-    if w.n_ledger > 0:
-        integrate_ledger(w, h)
-    if w.explicit == 0:
-        factor_newton(w, h)
-
-
-@compiled
 def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: float, origin: float) -> None:
     """Write states at times in order between the ends of the step, counted from an origin."""
     _probe_polynomial(w, h)
@@ -207,8 +180,17 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
         first = _write_by_parts(w, times, outputs, first, last, h, origin, int(parts))
     for i in range(first, last):
         _write_by_step(w, times, outputs, i, h, origin)
-    _restore_step(w, h)
-    # Restore the state of Newton's method too: the next step must not depend on the requested outputs.
+    # Restore the main step after others were taken inside it: its stages, quadratures and factors, the correction of
+    # its polynomial, and the state of Newton's method: the next step must not depend on the requested outputs.
+    if w.explicit != 0:
+        step_explicitly(w, h, np.inf)
+    for i in range(s):
+        copy(w.z_last[i], w.z[i])
+    copy(w.z_last[s], w.correction)
+    if w.n_ledger > 0:
+        integrate_ledger(w, h)
+    if w.explicit == 0:
+        factor_newton(w, h)
     w.theta, w.contraction, w.guess_error, w.newton_steps = theta, contraction, guessed, tries
 
 

@@ -326,8 +326,7 @@ def fold(value: float) -> Trial:
         other = OverdampedPullOff(**given, delta_w=beyond)
         return {"g_n": gaps + speeds * (t - np.array([other.time(g) for g in gaps]))}
 
-    data = {"t_max": exact.t_max, "g_0": exact.g_0, "k": exact.k, "c": exact.c, "w": exact.w}
-    passed = Exact(lambda t: {"g_n": np.append(0.0, gaps)}, data=data, again=again)
+    passed = Exact(lambda t: {"g_n": np.append(0.0, gaps)}, data={**gap, "w": exact.w}, again=again)
     return Trial("slow-passage", times.tolist(), passed, {"loading.w_n": exact.w})
 
 
@@ -429,7 +428,8 @@ def affinity(a: float, T: float = 310.0, rate: float = 1.0) -> Trial:
 def runaway(value: float) -> Trial:
     """Thermal explosion by self-heating: with the activation it becomes later, steeper, and less well conditioned."""
     E_a, A = value * GAS_CONSTANT * 300.0, math.exp(value)
-    exact = AdiabaticArrhenius(A=A, E_a=E_a, T_i=300.0, delta_T=80.0)
+    data = {"A": A, "E_a": E_a, "T_i": 300.0, "delta_T": 80.0}
+    exact = AdiabaticArrhenius(**data)
     changes = {"interface.bonding.arrhenius.A": A, "interface.bonding.arrhenius.E_a": E_a}
     phi = np.array([0.01, 0.1, 0.3, 0.5, 0.7, 0.9])
     times = exact.time(phi)
@@ -441,7 +441,6 @@ def runaway(value: float) -> Trial:
         bonds = phi + speeds * (t - other.time(phi))
         return {"phi": bonds, "T": other.T_i + other.delta_T * bonds}
 
-    data = {"A": A, "E_a": E_a, "T_i": 300.0, "delta_T": 80.0}
     return Trial("adiabatic-arrhenius", times.tolist(), Exact(exact.solution, data=data, again=again), changes)
 
 
