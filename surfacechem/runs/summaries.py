@@ -394,11 +394,11 @@ def store_summary(stream: Stream, store: Store, checked: Checked | None, file: P
     facts = [
         ("swept", swept_in_words(chunks.plan, names)),
         ("solved", _solved(chunks.model.system, chunks.run, chunks.lanes.title if chunks.lanes else "")),
-        ("ended", f"{ends.sum()} of {counted(chunks.plan.size, 'run')}: {words}"),
+        ("ended", ": ".join(filter(None, (f"{ends.sum()} of {counted(chunks.plan.size, 'run')}", words)))),
         ("error", str(checked or "")),
         ("balances", _store_balances(stream, done, checked)),
         ("written", str(file) if file else f"{store.path}, {len(done)} of {layout.chunks} chunks"),
     ]
-    stopped = ends[STATUSES.index("stopped")] == ends.sum()
+    stopped = 0 < ends.sum() == ends[STATUSES.index("stopped")]  # a part of few chunks may have none
     status = "failed" if ends[STATUSES.index("failed")] else "stopped" if stopped else "finished"
     return status, Sheet(chunks.simulation.case.title or "untitled", facts)
