@@ -33,6 +33,13 @@ MISTAKES = [
         "case.yaml:7: interface.medium: a film that stores heat needs a thickness. Add `thickness`.",
     ),
     (
+        BODIES
+        + "interface:\n  temperature: T_1\n  medium: {growth: [film-wear: {L: 1 m}]}\n"
+        + "  potential: [film-capacity]\nloading: {v: 1 m/s}\n"
+        + RUN.replace("T_2: 310 K", "T_2: 310 K, d_m: 1 nm"),
+        "case.yaml:7: interface.medium.growth: the heat that a growing film stores is neglected",
+    ),
+    (
         BODIES + "interface:\n  potential:\n    - penalty: {E_n: 1e12}\nloading: {p: 1 Pa, g_n: 0}\n" + RUN,
         "case.yaml:8: loading.p: p has two roles: ",
     ),

@@ -196,8 +196,29 @@ def test_sweeps_name_the_mechanism_as_the_case_does(tmp_path):
         case.sweep({"loading.f": ["0 pN", "5 pN"]})
 
 
-@pytest.mark.parametrize(("end", "told"), [("0 Pa", True), ("1 Pa", False)])
-def test_a_stage_that_waits_for_what_is_so_from_the_start_is_told(end, told):
+DOWN, PRESS = "down: {w_n: -100 nm/s, for: 0.3 s}", "press: {w_n: -100 nm/s, until: {p: 1 kPa}}"
+
+
+@pytest.mark.parametrize(
+    ("stages", "told"),
+    [
+        (
+            ["approach: {w_n: -100 nm/s, until: {p: 0 Pa}}"],
+            "the stage approach waits until p rises to 0, which it is as",
+        ),
+        (["approach: {w_n: -100 nm/s, until: {p: 1 Pa}}"], ""),
+        ([PRESS, "hold: {until: {p: 1 kPa}}"], "the stage hold waits until p rises to 1000, which it is as the stage"),
+        ([PRESS, "hold: {until: {p: 2 kPa}}"], ""),
+        ([PRESS, "up: {w_n: 1 nm/s, until: {w_n: 0 nm}}"], ""),
+        ([DOWN, "up: {w_n: 20 nm/s, until: {w_n: 20 nm}}"], "the stage up waits until w_n rises to 2e-08, which it is"),
+        ([DOWN, "on: {w_n: -9 nm/s, until: {w_n: {falls-to: 30 nm}}}"], "the stage on waits until w_n falls to 3e-08"),
+        ([DOWN, "up: {w_n: 20 nm/s, until: {w_n: 21 nm}}"], ""),
+    ],
+)
+def test_a_stage_that_waits_for_what_is_so_as_it_begins_is_told(stages, told):
     """Bonds far from touch pull with 1e-245 Pa, whose sign is roundoff."""
-    warnings = surfacechem.load("press-hold-pull", [f"programme.approach.until.p={end}"]).system.warnings
-    assert any("the stage approach waits until p rises to 0, which it is" in text for text in warnings) == told
+    programme = ", ".join(f"{{{stage}}}" for stage in stages)
+    warnings = surfacechem.load("press-hold-pull", [f"programme=[{programme}]"]).system.warnings
+    found = [text for text in warnings if "which it is" in text]
+    assert len(found) == bool(told)
+    assert told in "".join(found)

@@ -93,6 +93,10 @@ def _given(build: Build, name: str, value: float | Property) -> Expression:
 
 def _free_energy(build: Build, found: Medium, fluid: Callable[[], FluidFit] | None) -> Expression:
     """Return the thermal free energy per volume, whose second derivative gives the heat capacity."""
+    if found.growth:
+        message = "the heat that a growing film stores is neglected, as such films are nanometres thick"
+        remedy = "Remove `film-capacity`, or give a `thickness` instead of `growth`."
+        raise InputError(f"{message}. {remedy}", Place(path=f"{PATH}.growth"))
     if found.thickness is None:
         raise InputError("a film that stores heat needs a thickness. Add `thickness`.", Place(path=PATH))
     given = [name for name in ("rho_m", "cp_m") if name in found.properties]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import partial
 
@@ -19,6 +20,7 @@ from surfacechem.model.system import State
 from surfacechem.model.variables import unit_of
 from surfacechem.quantities import INTERNAL, VARIABLES
 from surfacechem.scene import Stage
+from surfacechem.tolerances import FEW_EPS
 
 STAGE = symengine.Symbol("stage")
 STAGE_START = Register("stage_begun", "time at which the stage began")
@@ -81,8 +83,9 @@ def stages(build: Build) -> Iterator[Constraint | str]:
             modes, reason = {STAGE: symengine.Integer(i + 1), begun: build.t}, f"the stage {item.name} ends"
             guard = _left(build, item)
             edges.append(Edge(f"end of {item.name}", guard, reason, modes, ends_stage=True, when={STAGE: (i,)}))
-            if i == 0 and item.variable:
-                yield from _caution(build, item, guard)
+            if item.variable and _is_so_already(build, i, guard):
+                told = f"the stage {item.name} waits until {_awaited(item)}, which it is as the stage begins"
+                yield f"{told}: it ends at once, or where roundoff decides. Give another value."
 
     def advancing(edge: Edge) -> dict[Expression, Expression]:
         """Return the new stage and its start time along an edge that stages wait for."""
@@ -96,11 +99,24 @@ def stages(build: Build) -> Iterator[Constraint | str]:
     yield Constraint(registers=(STAGE_START,), edges=tuple(edges), resets=advancing)
 
 
-def _caution(build: Build, item: Stage, guard: Expression) -> Iterator[str]:
-    """Yield a caution if the first stage waits for a value that its variable has from the start."""
-    if build.at_start(guard) == 0:
-        told = f"the stage {item.name} waits until {_awaited(item)}, which it is from the start"
-        yield f"{told}: roundoff may decide when the stage ends. Give another value."
+def _is_so_already(build: Build, i: int, guard: Expression) -> bool:
+    """True if a stage is known to wait for what its variable is already, or has passed, as the stage begins.
+
+    Known are variables that stages move, and one that the stage before waits for, unless rates decide its value.
+    """
+    item, moved = build.scene.programme[i], build.scene.programme[i].variable in build.motion.ramp_rates
+    known = build.scene.initial.get(item.variable, 0.0) if moved else math.nan
+    for stage in build.scene.programme[:i]:
+        if stage.variable == item.variable:
+            known = stage.value
+        elif item.variable in stage.rates:
+            known += stage.rates[item.variable] * (stage.duration or math.nan)
+        elif not moved:
+            known = math.nan
+    if not moved and {state.dot for state in build.states} & build.expanded(guard).free_symbols:
+        known = math.nan
+    left = known - item.value if item.rising else item.value - known
+    return left >= -FEW_EPS * abs(item.value) or (i == 0 and build.at_start(guard) == 0)
 
 
 def _refuse_unknown_event(build: Build, i: int, item: Stage) -> None:
