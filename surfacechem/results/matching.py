@@ -1,7 +1,7 @@
 """Exact solution of a scene: parameters read off the scene, and a check that it solves the scene's equations.
 
-An exact solution that does not belong to the scene is refused: it must have the initial values of the scene and satisfy
-the assembled equations.
+An exact solution that does not belong to the scene is refused: it must have the initial values of the scene, satisfy
+the assembled equations, and conserve the energy of the scene in its jumps.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache, partial
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from surfacechem.results.event_table import SIDE
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Array
 from surfacechem.solve.run import Trajectory
-from surfacechem.tolerances import EQUAL, EQUATION_MISMATCH, FEW_EPS, QUARTER_EPS, RUN_EPS, SQRT_EPS
+from surfacechem.tolerances import EQUAL, EQUATION_MISMATCH, FEW_EPS, QUARTER_EPS, RUN_EPS, RUN_ERROR, SQRT_EPS
 
 Solution = Callable[[Array], dict[str, Array]]
 """Function for exact values under the names of the scene, at any times."""
@@ -82,7 +83,7 @@ def exact_values(
     before_end = times[-1] * (1 - SIDE * np.array([2.0, 4.0]))
     # A run that ends at its start meets no equation.
     probed = tested and len(times) > 1 and not reference.continuous
-    probes, since = _probes(*_edges(run)) if probed else (np.empty(0), np.empty(0))
+    probes, since = _probes(run) if probed else (np.empty(0), np.empty(0))
     step = DIFFERENCE_STEP * since
     around = probes + np.multiply.outer(np.arange(-2, 3), step)
     # All times in one call, as the cost of an exact solution is per call.
@@ -106,6 +107,7 @@ def exact_values(
     if probed:
         near = {each: values[first:].reshape(5, -1) for each, values in every.items()}
         _check_equations(near, run, probes, step)
+        _check_jumps(lambda t: solution(np.minimum(t, reference.end_time)), run, side)
     return exact
 
 
@@ -124,7 +126,7 @@ def _choose_sides(
         k = np.searchsorted(around, times)
         near = np.minimum(times - around[k - 1], around[k] - times) <= SIDE * times
         for way in (-SIDE, SIDE, -side, side) if near.any() else ():
-            _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
+            _take_nearer(exact, solution(times[near] * max(1 + 2 * way, 0.0)), run, near)
         if near[-1]:
             return
     last = np.array([values[-1] for values in exact.values()])
@@ -239,6 +241,7 @@ def _check_equations(near: Mapping[str, Array], run: Trajectory, t: Array, step:
     _check_given({name: found[2] for name, found in near.items()}, run, t, y, ydot)
     segment = np.searchsorted(problem.segments[1:-1], t, side="left")
     inputs = np.concatenate([t[:, None], y, ydot, problem.parameters[segment]], axis=1)
+    _check_guards(run, inputs)
     misses = program.residual(inputs)
     by_state, by_rate = program.derivatives(inputs)
     terms = by_rate * ydot[:, None, :]
@@ -265,6 +268,44 @@ def _check_equations(near: Mapping[str, Array], run: Trajectory, t: Array, step:
         raise InputError(f"at t = {t[j]:.3g} s it misses the equation of {equation} by {100 * parts.max():.3g}%.")
 
 
+def _check_guards(run: Trajectory, inputs: Array) -> None:
+    """Refuse a solution that is where the scene jumps; ``inputs`` are its states in the modes of the run."""
+    model, first = run.model, len(run.model.margins)
+    if model.jumper is None or model.program.margins is None:
+        return
+    active = [model.system.active_guards(row)[first:] for row in inputs[:, 1 + 2 * model.program.n :]]
+    least = -EQUATION_MISMATCH * model.jumper.first_magnitudes(inputs)[:, first:]
+    passed = (model.program.margins(inputs)[:, first:] < least) & active
+    for k, j in np.argwhere(passed)[:1]:
+        why = model.system.edges[j].reason
+        raise InputError(f"at t = {inputs[k, 0]:.3g} s it is beyond a jump of the scene: {why}.")
+
+
+def _check_jumps(solution: Solution, run: Trajectory, side: float) -> None:
+    """Refuse a solution that does not conserve the scene's energy in the jumps of the run that make heat of it.
+
+    Its energy on either side of a jump is that on the line through two times, which lie farther from the jump than
+    ``side`` and than the time of the jump may err.
+    """
+    model, columns, late = run.model, run.model.system.state_columns, max(side, RUN_ERROR * run.run.rtol)
+    moments = {t: list(jumps) for t, jumps in groupby(run.jumps, key=lambda jump: jump.t)}
+    for t, until, jumps in zip(moments, [*moments, run.result.t][1:], moments.values(), strict=False):
+        around = t * (1 + 2 * late * np.array([-2, -1, 1, 2]))
+        released = sum(abs(jump.released) for jump in jumps)
+        if not released or not (t - jumps[0].since <= around[0] and around[3] <= until):
+            continue
+        near = solution(around)
+        y = np.column_stack([near[name] for name in columns])
+        modes = np.repeat([jumps[0].before.parameters, jumps[-1].after.parameters], 2, axis=0)
+        named = model.named(np.column_stack((around, y, np.zeros_like(y), modes)))
+        energy = named[:, model.system.output_columns["E_total"]]
+        before, after = 2 * energy[1:3] - energy[::3]
+        missing = after - before + sum(jump.heat_out - sum(jump.work.values()) for jump in jumps)
+        if not abs(missing) <= (EQUATION_MISMATCH + late) * released + RUN_EPS * np.abs(energy).max():
+            text = f"{abs(missing):.3g} J/m^2 of the {released:.3g} J/m^2 that the scene releases"
+            raise InputError(f"at t = {t:.3g} s it misses {text}.")
+
+
 def _check_given(exact: Mapping[str, Array], run: Trajectory, t: Array, y: Array, ydot: Array) -> None:
     """Refuse a solution for another load."""
     columns = run.model.system.output_columns
@@ -283,11 +324,22 @@ def _edges(run: Trajectory) -> tuple[float, ...]:
     return tuple(sorted({end, *(t for t in run.result.problem.segments.tolist() if t <= end)}))
 
 
-@lru_cache
-def _probes(*edges: float) -> tuple[Array, Array]:
-    """Return the times at which the equations are tested, inside the arcs between ``edges``, and the time since the
-    start of the arc at each.
+def _probes(run: Trajectory) -> tuple[Array, Array]:
+    """Return the times at which the equations are tested, and the time since the start of the arc at each: inside arcs
+    and, as all may be over in a small part of the first, at the ends of some of its steps.
     """
+    edges, steps = _edges(run), run.result.steps
+    probes, since = _spread(*edges)
+    if steps is None:
+        return probes, since
+    first = steps.t[(steps.t > 0) & (steps.t < (1 - END_PART) * edges[1])]
+    some = first[np.unique(np.linspace(0, len(first) - 1, MOST_PROBES).astype(int))] if len(first) else first
+    return np.append(some, probes), np.append(some, since)
+
+
+@lru_cache
+def _spread(*edges: float) -> tuple[Array, Array]:
+    """Return times inside the arcs between ``edges``, and the time since the start of the arc at each."""
     if len(edges) < 2:
         raise InputError("the run ended before anything could be compared.")
     long = np.flatnonzero(np.diff(edges) > SHORTEST_ARC * np.array(edges[1:]))

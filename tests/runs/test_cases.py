@@ -13,8 +13,10 @@ import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.format import load_text, names
 from surfacechem.quantities import BOLTZMANN
+from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import largest_errors
 from surfacechem.results.error_estimates import against_exact, computed, floors
+from surfacechem.results.matching import exact_values, match
 from surfacechem.runs.simulation import Simulation
 
 CELLS = ("sudden-contact", "epoxy-cure-thick")
@@ -86,6 +88,9 @@ def test_an_exact_solution_is_held_against_balances_without_rates():
     assert "it misses the equation of T_c by" in Simulation(load_text(rubbing)).run().accuracy.source
 
 
+STRENGTH = "interface.limits.tensile-strength.t_max.times"
+
+
 @pytest.mark.parametrize(
     ("name", "change", "reason"),
     [
@@ -98,7 +103,14 @@ def test_an_exact_solution_is_held_against_balances_without_rates():
         ("cohesive-pull-off", "mechanics={normal: {m: 1 kg/m^2, c_g: 1 MPa s/m}}", "it says nothing of v_n"),
         ("coulomb-stop", "loading.p={ramp: {start: 30 kPa, rate: 10 MPa/s}}", "it misses the equation of v"),
         ("debonding", "loading.w_n={table: {times: [0 s, 9 s], values: [0, 9 um]}}", "it needs w_dot"),
+        ("debonding", "interface.potential.bond-energy.K=0.8", "at t = 7.75 s it misses 30 J/m^2 of the 180 J/m^2"),
+        ("debonding", f"{STRENGTH}.proportional.about=0.5", "beyond a jump of the scene: the interface debonds as"),
         ("debonding-cooling", "loading.w_n.ramp.start=0.1 um", "its w_n is"),
+        (
+            "adiabatic-arrhenius",
+            "interface.bonding=[arrhenius: {A: 1e13, E_a: 60 kJ/mol, n: 2}]",
+            "the equation of phi",
+        ),
         (
             "compliant-debonding",
             "loading.g_n={table: {times: [0 s, 8 s], values: [0, 8.1 um]}}",
@@ -114,6 +126,14 @@ def test_an_exact_solution_of_another_scene_is_not_used(name, change, reason):
     source = surfacechem.run(name, changes).accuracy.source
     assert "does not apply to this scene" in source
     assert reason in source
+
+
+def test_a_run_far_from_an_exact_solution_with_a_jump_has_exact_values_all_the_same():
+    """A time that errs by more than half of itself is sought from the start on."""
+    simulation = load("debonding")
+    run, case = simulation.run().trajectory.stored, simulation.case
+    reference = match(case.reference.name, {}, SceneView(case.scene, run))
+    assert exact_values(reference, case.scene, run, side=0.8, tested=False)["T"][-1] > 360
 
 
 TOLD = ("compliant-debonding", "debonding-cooling", "endothermic-kappa-0p1", "stick-slip-rebonding")
