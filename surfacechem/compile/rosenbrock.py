@@ -10,7 +10,6 @@ variables of Hairer & Wanner, Solving Ordinary Differential Equations II, sectio
 
 import json
 from collections.abc import Collection, Iterable
-from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +18,8 @@ from llvmlite import ir
 
 from surfacechem.compile import PREPARATION
 from surfacechem.compile.objectcode import engine
-from surfacechem.compile.vectors import LANES, LaneFunction, by_vector, entry, function_body, number, object_code
-from surfacechem.tolerances import EPS, LINEAR_RTOL, NEWTON_EPS, UNEQUAL
+from surfacechem.compile.vectors import LaneFunction, by_vector, entry, function_body, number, object_code
+from surfacechem.tolerances import EPS, LINEAR_RTOL
 
 _GIVEN = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
 GAMMA, NODES, CHANGES, _COUPLINGS, _TIME_PARTS, _DENSE = (
@@ -49,8 +48,9 @@ def compile_step(states: LaneFunction, slopes: LaneFunction, nonzeros: Collectio
 
     ``nonzeros`` are the positions of the derivatives that may be nonzero.
     Inputs are those of the rates, with the step [s] in row 1 + n. Results are, in rows of n vectors, the rates at the
-    start (given), the increments of the stages (the last one is the error), the rates and states at the end, and the
-    derivatives; then a flag of a doubtful step, and the weights of the states (given).
+    start (given), the increments of the stages (the last one is the error), the rates and states at the end, the
+    derivatives, and what the rates at the end are open by; then a flag of a doubtful step, and the weights of the
+    states (given).
     """
     step = _Step(states, slopes, nonzeros)
     step.generate()
@@ -68,7 +68,7 @@ class _Step:
         *self.start, self.h = self._load(self.inputs, 0, 2 + self.n)
         self.end = (1 + STAGES) * self.n
         self.derivatives = self.end + 2 * self.n
-        self.weights = self.derivatives + slopes.n_out + 1
+        self.weights = self.derivatives + slopes.n_out + self.n + 1
         self.units = self._load(self.out, self.weights, self.n)
         self.terms: list[Any] = []
         """Sizes of the terms that each pivot is the sum of."""
@@ -135,40 +135,18 @@ class _Step:
             self._store(self.out, (1 + stage) * n, rates)
         after = self._rates(1.0, [*CHANGES[-1], 1.0], increments)
         self._store(self.out, self.end + n, self._load(self.inputs, 1, n))
-        self._store_errors(increments[-1], open_by, [b.fsub(*each) for each in zip(after, before, strict=True)], after)
+        self._store_gaps(increments[-1], open_by, list(map(b.fsub, after, before)), inverse)
         b.ret_void()
 
-    def _store_errors(self, last: list[Any], open_by: list[Any], changes: list[Any], after: list[Any]) -> None:
-        """Replace the errors of the states, the last increments, where an equation has become so much softer than the
-        matrix that these are small and close no gap: what it is open by is then the error of its rate.
+    def _store_gaps(self, last: list[Any], open_by: list[Any], changes: list[Any], inverse: Any) -> None:
+        """Store what the rates at the end are open by after the last increments, which were to close what they were
+        open by before: nothing where the equations are linear.
 
-        Given are what the equations were open by before the last increments, the changes of the rates by these, and
-        the rates at the end. A gap is no error if states that move by their weights change the rate by more.
+        Given are also the changes of the rates by these increments, and the inverse of the step.
         """
-        # What roundoff closes counts for nothing.
-        b, norm, soft, left = self.builder, number(NEWTON_EPS), [], []
-        unit = b.fmul(number(GAMMA), self.h)
-        per_unit = b.fdiv(number(1.0), unit)
-        for increment, weight in zip(last, self.units, strict=True):
-            size = b.fdiv(self._size(increment), weight)
-            norm = b.select(b.fcmp_ordered(">", size, norm), size, norm)
-        for increment, before, change, weight in zip(last, open_by, changes, self.units, strict=True):
-            closed = b.fsub(b.fmul(increment, per_unit), change)
-            left.append(b.fsub(before, closed))
-            # Increments of norm one, the tolerance, would close so much more.
-            stays = b.fcmp_ordered(">", b.fmul(norm, self._size(left[-1])), self._size(closed))
-            soft.append(b.and_(stays, b.fcmp_ordered(">", b.fmul(self._size(left[-1]), unit), weight)))
-        bits = ir.IntType(LANES)
-        found = b.icmp_unsigned("!=", b.bitcast(reduce(b.or_, soft), bits), bits(0))
-        with b.if_then(found, likely=False):
-            # Where roundoff exceeds the increments, they close nothing even of a stiff equation.
-            moves = [b.fmul(number(UNEQUAL[m % len(UNEQUAL)]), weight) for m, weight in enumerate(self.units)]
-            self._store(self.inputs, 1, map(b.fadd, self._load(self.inputs, 1, self.n), moves))
-            moved = self._call(self.states, STAGES * self.n)
-            for m, increment in enumerate(last):
-                unexplained = b.fcmp_ordered(">", self._size(left[m]), self._size(b.fsub(moved[m], after[m])))
-                error = b.select(b.and_(soft[m], unexplained), b.fmul(left[m], unit), increment)
-                self._store(self.out, STAGES * self.n + m, [error])
+        b, per_unit = self.builder, self.builder.fmul(inverse, number(1.0 / GAMMA))
+        closed = [b.fsub(b.fmul(increment, per_unit), change) for increment, change in zip(last, changes, strict=True)]
+        self._store(self.out, self.weights - 1 - self.n, map(b.fsub, open_by, closed))
 
     def _rates(self, node: float, factors: list[float], increments: list[list[Any]]) -> list[Any]:
         """Evaluate the rates at a fraction of the step, where these factors of the increments are the change."""

@@ -160,6 +160,13 @@ run: {until: 1.2 s}
 MU_K = "interface.friction.stribeck.mu_k"
 
 
+def test_what_begins_to_slide_goes_on_where_residuals_are_roundoff():
+    """Beside zero the velocity changes with the last digit of the spring's force, by its full size and its sign."""
+    model, run = case_runs.load(BESIDE_A_CORNER).model, case_runs.load(BESIDE_A_CORNER).case.run
+    for part in range(20):
+        assert model.solve(run, {MU_K: 0.3 + part / 2000}).result.status is Status.FINISHED
+
+
 def test_outputs_beside_a_corner_are_on_their_own_sides_where_the_time_of_an_arc_cannot_tell_them(monkeypatch):
     simulation = case_runs.load(BESIDE_A_CORNER)
     beside = [np.nextafter(1.0, 0.0), 1.0, np.nextafter(1.0, 2.0)]

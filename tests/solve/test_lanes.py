@@ -242,13 +242,26 @@ def test_what_becomes_slow_within_a_step_lags(stiff, soft, rtol, method):
     assert alike(program, [0.0], [], 1.0, rtol, method) == pytest.approx(1 - lag, rel=10 * rtol)
 
 
+SUDDEN = [
+    (30.0, -6.0, 0.001, 0.5, 0.0), (14.5, -14.3, 1e-3, 0.397, 0.0), (21.5, -13.2, 4e-4, 0.895, 0.0),
+    (14.9, -7.0, 3.4e-4, 0.663, 5.8e11), (13.6, -14.2, 4.7e-3, 0.321, 1.2e8), (6.6, -3.2, 1e-3, 0.865, 4.4e8),
+]  # fmt: skip
+
+
 @pytest.mark.parametrize("method", [(), ("implicit_lanes",)])
 @pytest.mark.parametrize("rtol", [1e-5, 1e-6, 1e-8])
-def test_what_becomes_slow_within_a_thousandth_of_a_run_lags(rtol, method):
-    """Corrections by a matrix that is stiffer by 36 decades are nothing: what they close is roundoff."""
-    rate = se.exp(np.log(10.0) * (12.0 - 18.0 * se.tanh(1000.0 * (T - 0.5))))
-    program = compile_program(T, [Y], [DY], [], [DY + rate * (Y - se.sin(3.0 * T))])
-    exact, found = (alike(program, [0.0], [], 1.0, each, method, spacing=1 / 60) for each in (1e-12, rtol))
+@pytest.mark.parametrize(("stiff", "soft", "span", "at", "exchange"), SUDDEN)
+def test_what_becomes_slow_within_a_thousandth_of_a_run_lags(stiff, soft, span, at, exchange, rtol, method):
+    """Corrections by a matrix that is stiffer by 36 decades are nothing: what they close is roundoff; nor do steps pass
+    over rates that vanish before their first stage. An exchange with a second state hides neither.
+    """
+    x, dx, *given = se.symbols("x dx upper lower width middle exchanged")
+    upper, lower, width, middle, exchanged = given
+    falling = upper + lower - (upper - lower) * se.tanh((T - middle) / width)
+    led, taken = 10 ** (falling / 2) * (Y - se.sin(3.0 * T)), exchanged * (Y - x)
+    program = compile_program(T, [Y, x], [DY, dx], given, [DY + led + taken, dx - taken])
+    numbers = [stiff, soft, span, at, exchange]
+    exact, found = (alike(program, [0.0, 0.0], numbers, 1.0, each, method, spacing=1 / 60) for each in (1e-12, rtol))
     assert found == pytest.approx(exact, rel=10 * rtol)
 
 

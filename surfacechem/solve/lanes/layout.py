@@ -91,10 +91,11 @@ RADAU_MEMORY = {
 
 ROSENBROCK_MEMORY = {
     # rates at the start, increments of the stages, rates and states at the end, as the code of the step writes them; it
-    # continues with the derivatives of the rates and a flag of doubtful factors, and reads the weights
+    # continues with the derivatives of the rates, what those at the end are open by and a flag of doubtful factors, and
+    # reads the weights
     **_arrays("k", 11, "columns"),
     **_arrays("jacobian", "n", "n"),
-    **_arrays("time_slopes", "n"),
+    **_arrays("time_slopes gap", "n"),
     **_arrays("doubtful"),
     **_arrays("weight", "n"),
     **MEMORY,

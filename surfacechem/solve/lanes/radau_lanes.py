@@ -54,7 +54,7 @@ from surfacechem.solve.radau.linear import PIVOT_PART
 from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
 from surfacechem.solve.radau.step import CONTRACTING, LEAST_CONVERGENT, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.work import JACOBIAN, RATES, RESIDUAL, compiled, evaluate, evaluate_at, weighted_sums
-from surfacechem.tolerances import EPS, FORMULA_EPS, NEGLIGIBLE, NEWTON_EPS, TINY, UNEQUAL
+from surfacechem.tolerances import EPS, FORMULA_EPS, NEGLIGIBLE, NEWTON_EPS, TINY, ULPS, UNEQUAL
 
 MEMBER, STAGES = 1, 5
 """Member of the family in these steps, and its number of stages."""
@@ -284,43 +284,56 @@ def _move_states(w: Any) -> None:
 
 
 @compiled
-def _are_open(w: Any, residual: Any) -> Any:
+def are_open(w: Any, residual: Any, unit: Any, rates: Any) -> Any:
     """Mask of lanes in which an equation is open by more than a rate that moves its state by the tolerance in the step,
-    or by roundoff of its rate.
+    or by roundoff of its rate; ``unit`` [1/s] is the diagonal of its matrix.
     """
-    unit, found = tables.GAMMA[MEMBER] / lanes(w.h), same(0.0)
+    found = same(0.0)
     for m in range(w.n):
-        allowed = unit * lanes(w.weight[m]) + NEWTON_EPS * absolute(lanes(w.k[STAGES, m]))
+        allowed = unit * lanes(w.weight[m]) + NEWTON_EPS * absolute(lanes(rates[m]))
         found = where(absolute(lanes(residual[m])) > allowed, 1.0, found)
     return found > 0.5
 
 
 @compiled
-def _are_astray(w: Any, norm: Any) -> Any:
-    """Mask of lanes in which Newton's method ends at a wrong state, because equations have become much softer than its
-    matrix: its last corrections, of this norm, are small and close no gap, or by roundoff alone.
-
-    The equations at the end of the step are then open by more than states that move by their weights change them. How
-    far they were open before the last correction is in ``error``.
+def norm_at_end(w: Any, s: int, diagonal: Any) -> Any:
+    """The norm of what the equations at the inputs, the end of the step, are open by (``rhs``), through the matrix
+    there, which overwrites matrix s; roundoff is left out.
     """
-    astray = _are_open(w, w.error)
+    differentiate(w)
+    factor(w, s, diagonal, same(0.0))
+    for i in range(w.n):
+        terms, unit, left = same(0.0), lanes(w.weight[i]), lanes(w.rhs[i])
+        for j in range(w.n):
+            terms = terms + absolute(lanes(w.jacobian[i, j]) * lanes(w.inputs[1 + j])) * (unit / lanes(w.weight[j]))
+        put(w.rhs[i], where(absolute(left) > ULPS * terms, left, 0.0))
+        put(w.imaginary[i], 0.0)
+    solve(w, s, w.rhs, w.imaginary)
+    put_start(w)
+    differentiate(w)
+    return error_norm(w, w.rhs)
+
+
+@compiled
+def _are_astray(w: Any) -> Any:
+    """Mask of lanes in which Newton's method ends at a wrong state, because equations have become much softer than its
+    matrix: its last corrections are small and close no gap.
+
+    The equations at the end of the step are then open by more than the tolerance, through the matrix there. How far
+    they were open before the last correction is in ``error``.
+    """
+    diagonal = EIGENVALUES[0].real / lanes(w.h)
+    astray = are_open(w, w.error, diagonal, w.k[STAGES])
     if any_lane(astray):
         _put_slopes(w, STAGES - 1)
         _put_stage(w, STAGES - 1)
         evaluate(w, RESIDUAL, w.rhs)
         for m in range(w.n):
-            rate, before = lanes(w.rhs[m]), lanes(w.error[m])
-            left = lanes(w.k[STAGES, m]) - rate
-            put(w.imaginary[m], rate)
-            put(w.rhs[m], where(larger(norm, NEWTON_EPS) * absolute(left) > absolute(left - before), left, 0.0))
-        astray = astray & _are_open(w, w.rhs)
+            put(w.rhs[m], lanes(w.k[STAGES, m]) - lanes(w.rhs[m]))
+        astray = astray & are_open(w, w.rhs, diagonal, w.k[STAGES])
     if any_lane(astray):
-        _move_states(w)
-        evaluate(w, RESIDUAL, w.error)
-        for m in range(w.n):
-            left, change = lanes(w.rhs[m]), absolute(lanes(w.error[m]) - lanes(w.imaginary[m]))
-            put(w.rhs[m], where(absolute(left) > change, left, 0.0))
-        astray = astray & _are_open(w, w.rhs)
+        # In place of a matrix of a pair, which serves no more.
+        astray = astray & ~(norm_at_end(w, 1, diagonal) <= 1.0)
     return astray
 
 
@@ -334,10 +347,9 @@ def _solve_stages(w: Any) -> Any:
     solved = active & ~active
     fresh = ~(lanes(w.h_last) > 0.0)
     contraction = exponential(newton.TRUST * logarithm(larger(where(fresh, 1.0, lanes(w.contraction)), same(EPS))))
-    theta, last, rate_last, smallest = same(0.0), same(1.0), same(0.0), same(0.0)
+    theta, last, rate_last = same(0.0), same(1.0), same(0.0)
     for iteration in range(MOST_ITERATIONS):
         norm = _correct(w, active)
-        smallest = where(active, norm, smallest)
         put(w.evaluations, lanes(w.evaluations) + where(active, float(STAGES), 0.0))
         goes_on = norm < np.inf
         if iteration == 0:
@@ -366,7 +378,7 @@ def _solve_stages(w: Any) -> Any:
         last = larger(norm, same(TINY))
     put(w.theta, theta)
     put(w.contraction, contraction)
-    return solved & ~_are_astray(w, smallest)
+    return solved
 
 
 @compiled
@@ -473,6 +485,7 @@ def try_step(w: Any) -> None:
     solved = _solve_stages(w)
     for m in range(w.n):
         put(w.y_new[m], lanes(w.y[m]) + lanes(w.z[STAGES - 1, m]))
+    solved = solved & ~_are_astray(w)
     norm = _error_norm(w)
     if w.n_ledger > 0:
         ledger = _integrate_ledger(w)

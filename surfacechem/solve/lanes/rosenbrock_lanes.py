@@ -16,9 +16,9 @@ from surfacechem.compile.rosenbrock import GAMMA as GAMMA_OF_STAGES
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes import radau_lanes
 from surfacechem.solve.lanes.lane_run import CONSTANTS, loop_of
-from surfacechem.solve.lanes.lane_step import error_norm, nothing, put_moved, put_start
+from surfacechem.solve.lanes.lane_step import error_norm, larger, nothing, put_moved, put_start
 from surfacechem.solve.lanes.layout import ORDER, ROSENBROCK_MEMORY
-from surfacechem.solve.lanes.vector import lanes, put, same, where
+from surfacechem.solve.lanes.vector import any_lane, lanes, put, same, where
 from surfacechem.solve.radau.work import compiled, evaluate, weighted_sums
 
 STEP = CONSTANTS + 1
@@ -54,7 +54,13 @@ def try_step(w: Any) -> None:
     put(w.evaluations, lanes(w.evaluations) + float(STAGES))
     for m in range(w.n):
         put(w.y_new[m], lanes(w.k[1 + END_STAGE, m]))
-    put(w.norm, error_norm(w, w.k[STAGES]))
+    norm, diagonal = error_norm(w, w.k[STAGES]), 1.0 / lanes(w.h) / GAMMA_OF_STAGES
+    hides = (norm < 1.0) & radau_lanes.are_open(w, w.gap, diagonal, w.k[END_STAGE])
+    if any_lane(hides):
+        for m in range(w.n):
+            put(w.rhs[m], lanes(w.gap[m]))
+        norm = where(hides, larger(norm, radau_lanes.norm_at_end(w, 0, diagonal)), norm)
+    put(w.norm, norm)
 
 
 @compiled

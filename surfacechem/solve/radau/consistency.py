@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.radau.linear import factor, fold_chains, solve_real
+from surfacechem.solve.radau.roundoff import measure_differences, rounding_of
 from surfacechem.solve.radau.work import RESIDUAL, any_true, compiled, evaluate, evaluate_jacobian, finite, set_inputs
 from surfacechem.tolerances import FEW_EPS, NEGLIGIBLE, SQRT_EPS, TINY
 
@@ -145,6 +146,25 @@ def _is_rounding(w: Any, delta: Any) -> bool:
 
 
 @compiled
+def _is_solved(w: Any) -> bool:
+    """True if all equations hold within roundoff of their terms: corrections tell nothing then, as those of a velocity
+    beside zero, where friction has a kink.
+    """
+    solved = w.links == 0 and _residual(w)
+    if solved:
+        measure_differences(w, w.trial, w.trial_dot)
+        for i in range(w.n):
+            solved = solved and abs(w.rhs[i]) <= rounding_of(w, i, w.trial, w.trial_dot)
+    return bool(solved)
+
+
+@compiled
+def _ends_in_roundoff(w: Any, delta: Any, norm: float) -> bool:
+    """True if corrections of this size that do not decrease are roundoff, or if that is all that is open."""
+    return bool(norm <= SQRT_EPS or _is_rounding(w, delta) or _is_solved(w))
+
+
+@compiled
 def find_consistent(w: Any) -> int:
     """Make the trial state consistent at the time in the inputs."""
     if not _residual(w):
@@ -166,6 +186,6 @@ def find_consistent(w: Any) -> int:
             return CONSISTENT
         if not _damped(w, delta):
             # At roundoff level the corrections no longer decrease.
-            return CONSISTENT if norm <= SQRT_EPS or _is_rounding(w, delta) else NO_STATE
+            break
         norm_last = norm
-    return NO_STATE
+    return CONSISTENT if _ends_in_roundoff(w, delta, norm) else NO_STATE

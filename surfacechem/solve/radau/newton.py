@@ -20,7 +20,7 @@ from surfacechem.solve.radau.linear import (
     solve_complex,
     solve_real,
 )
-from surfacechem.solve.radau.roundoff import correction_is_noise, measure_differences
+from surfacechem.solve.radau.roundoff import correction_is_noise
 from surfacechem.solve.radau.work import (
     RESIDUAL,
     clear,
@@ -34,7 +34,10 @@ from surfacechem.solve.radau.work import (
 )
 from surfacechem.tolerances import EPS, NEGLIGIBLE, NEWTON_EPS, TINY
 
-CONVERGED, DIVERGED, NOT_FINITE = range(3)
+CONVERGED, OPEN, DIVERGED, NOT_FINITE = range(4)
+"""Outcomes of Newton's method; open where corrections are small, but equations may have become so much softer than its
+matrix that this tells nothing.
+"""
 
 NEWTON_PART = NEGLIGIBLE
 """Newton error allowed, in units of the tolerance. The order of the method makes steps more accurate than the
@@ -304,42 +307,18 @@ def _correct(w: Any) -> float:
 
 
 @compiled
-def _is_astray(w: Any, stages: int, h: float, norm: float) -> bool:
-    """True if Newton's method ends at a wrong state, because equations have become much softer than its matrix: its
+def _may_be_astray(w: Any, stages: int, h: float, norm: float) -> bool:
+    """True if Newton's method may end at a wrong state, because equations have become much softer than its matrix: its
     last corrections, of this norm, are small and close no gap.
 
-    The equations at the end of the step are then open by more than all states change them within their tolerances, and
-    by more than roundoff. What they were open by before the last correction is in ``columns``.
+    What the equations at the end of the step were open by before the last correction is in ``columns``.
     """
     if not _may_be_open(w, h, w.columns):
         return False
     set_stage(w, stages - 1, h)
     evaluate(w, RESIDUAL, w.rhs)
     w.residuals += 1
-    for i in range(w.core):
-        # Corrections of norm one, the tolerance, would close so much more; what roundoff closes counts for nothing.
-        if max(norm, NEWTON_EPS) * abs(w.rhs[i]) <= abs(w.rhs[i] - w.columns[i]):
-            w.columns[i] = 0.0
-    if not _may_be_open(w, h, w.columns):
-        return False
-    for j in range(w.n):
-        w.trial[j], w.trial_dot[j] = w.inputs[1 + j], w.inputs[1 + w.n + j]
-    measure_differences(w, w.trial, w.trial_dot)
-    for i in range(w.core):
-        w.columns[i] = ROUNDINGS * w.differences[i]
-    for j in range(w.core):
-        y, ydot = w.inputs[1 + j], w.inputs[1 + w.n + j]
-        w.inputs[1 + j] = y + w.weight[j]
-        w.inputs[1 + w.n + j] = ydot + w.weight[j] * tables.GAMMA[w.member] / h
-        evaluate(w, RESIDUAL, w.delta)
-        w.inputs[1 + j], w.inputs[1 + w.n + j] = y, ydot
-        for i in range(w.core):
-            w.columns[i] += abs(w.delta[i] - w.rhs[i])
-    w.residuals += w.core
-    astray = False
-    for i in range(w.core):
-        astray = astray or abs(w.rhs[i]) > w.columns[i]
-    return astray
+    return bool(_may_be_open(w, h, w.rhs))
 
 
 @compiled
@@ -401,7 +380,4 @@ def solve_stages(w: Any, h: float) -> int:
         w.guess_error = 0.0
         if not correction_is_noise(w, s):
             return DIVERGED
-    if _is_astray(w, s, h, norm):
-        w.h_last = 0.0  # predict nothing
-        return DIVERGED
-    return CONVERGED
+    return OPEN if _may_be_astray(w, s, h, norm) else CONVERGED

@@ -53,7 +53,7 @@ def measure_differences(w: Any, y: Any, ydot: Any) -> None:
 
 
 @compiled
-def _rounding_of(w: Any, i: int, y: Any, ydot: Any) -> float:
+def rounding_of(w: Any, i: int, y: Any, ydot: Any) -> float:
     """Roundoff of one equation of the core."""
     total = 0.0
     for j in range(w.core):
@@ -79,7 +79,7 @@ def spread_noise(w: Any, y: Any, ydot: Any) -> None:
     for i in range(core if w.links == 0 else core + 1):
         clear(column)
         if i < core:
-            column[i] = _rounding_of(w, i, y, ydot)
+            column[i] = rounding_of(w, i, y, ydot)
         else:
             # Heat entering a chain anywhere raises all its temperatures: nothing cancels in a single sum.
             _chain_noise(w, y, ydot, column)
@@ -111,7 +111,7 @@ def _bounds_serve(w: Any) -> bool:
     """
     measure_differences(w, w.y, w.ydot)
     for i in range(w.n):
-        w.delta[i] = _rounding_of(w, i, w.y, w.ydot)
+        w.delta[i] = rounding_of(w, i, w.y, w.ydot)
     bound_real(w, w.delta)
     for j in range(w.n):
         w.noise[j] = ULPS * abs(w.y[j]) + w.delta[j]

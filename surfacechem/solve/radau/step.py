@@ -38,17 +38,19 @@ from surfacechem.solve.radau.linear import solve_real
 from surfacechem.solve.radau.newton import (
     CONVERGED,
     NOT_FINITE,
+    OPEN,
     SHORTENED,
     differentiate_system,
     divide,
     end_of_step,
     factor_newton,
     predict,
+    set_stage,
     solve_stages,
     stage_count,
     value_and_slope,
 )
-from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise
+from surfacechem.solve.radau.roundoff import MAGNIFIED, find_noise, spread_noise
 from surfacechem.solve.radau.stepper import STOP
 from surfacechem.solve.radau.tables import GAMMA, MEMBER_RTOLS, START_SLOPE
 from surfacechem.solve.radau.work import (
@@ -58,6 +60,7 @@ from surfacechem.solve.radau.work import (
     compiled,
     copy,
     evaluate,
+    evaluate_jacobian,
     finite,
     put,
     row_of,
@@ -135,14 +138,20 @@ def error_norm(w: Any, floor: float) -> float:
 
 
 @compiled
-def _defect_at_start(w: Any, h: float, y: Any) -> bool:
-    """Store the defect of the polynomial's slope at the start of the step in ``error``; True if finite."""
+def _set_start_slope(w: Any, h: float) -> None:
+    """Store the slope of the polynomial at the start of the step in ``delta``."""
     k = w.member
     for m in range(w.n):
         slope = 0.0
         for j in range(stage_count(k)):
             slope += START_SLOPE[k, j] * w.z[j, m]
         w.delta[m] = slope / h
+
+
+@compiled
+def _defect_at_start(w: Any, h: float, y: Any) -> bool:
+    """Store the defect of the polynomial's slope at the start of the step in ``error``; True if finite."""
+    _set_start_slope(w, h)
     put(w, 0.0, y, w.delta)
     return bool(filter_residual(w))
 
@@ -172,6 +181,16 @@ def estimate_again(w: Any, h: float) -> float:
 
 
 @compiled
+def _may_hide(w: Any, h: float) -> bool:
+    """True if the defect at the start of the step, which stiff equations filter, exceeds the tolerance without them."""
+    _set_start_slope(w, h)
+    for j in range(w.n):
+        if not w.algebraic[j] and abs(w.delta[j] - w.ydot[j]) * h > w.loose * w.weight[j] * GAMMA[w.member]:
+            return True
+    return False
+
+
+@compiled
 def repeat_step(w: Any, size: float) -> float:
     """Repeat the step, or a part of it, with the size for which the matrices are factored and the full order of the
     method; return the norm of its error, infinite if it fails.
@@ -179,7 +198,7 @@ def repeat_step(w: Any, size: float) -> float:
     if w.explicit != 0:
         return float(step_explicitly(w, size, np.inf))
     predict(w, size)
-    return float(estimate_error(w, size)) if solve_stages(w, size) == CONVERGED else np.inf
+    return float(estimate_error(w, size)) if solve_stages(w, size) <= OPEN else np.inf
 
 
 @compiled
@@ -374,13 +393,107 @@ def _prepare(w: Any, h: float, foresee: bool) -> int:
             return NONFINITE
         w.jacobian_age = CURRENT
         w.h_jacobian = h
-    # Invalid until the factorization succeeds.
-    w.h_factored = 0.0
+    return GOOD if _factor(w, h) else SINGULAR
+
+
+@compiled
+def _factor(w: Any, h: float) -> bool:
+    """Factor the Newton matrices for this step size; True if none is singular."""
+    w.h_factored = 0.0  # invalid until the factorization succeeds
     copy(w.scale, w.pivot)
     if not factor_newton(w, h):
-        return SINGULAR
+        return False
     w.h_factored = h
-    return GOOD
+    return True
+
+
+@compiled
+def _renew_at_end(w: Any, h: float) -> bool:
+    """Renew the matrices at the end of the step, and leave its inputs and residuals there; True if none is singular."""
+    set_stage(w, stage_count(w.member) - 1, h)
+    evaluate_jacobian(w)
+    w.jacobians += 1
+    w.jacobian_age, w.h_jacobian = CURRENT, h
+    evaluate(w, RESIDUAL, w.rhs)
+    w.residuals += 1
+    return bool(finite(w.rhs) and _factor(w, h))
+
+
+@compiled
+def _is_astray(w: Any, h: float) -> bool:
+    """True if the residuals at the end of the step, through the matrices there, are an error beyond tolerance and
+    roundoff.
+    """
+    set_stage(w, stage_count(w.member) - 1, h)
+    for j in range(w.n):
+        w.trial[j], w.trial_dot[j], w.error[j] = w.inputs[1 + j], w.inputs[1 + w.n + j], w.rhs[j]
+    solve_real(w, w.error)
+    if error_norm(w, 0.0) * w.loose <= 1.0:
+        return False
+    spread_noise(w, w.trial, w.trial_dot)
+    return not error_norm(w, MAGNIFIED) * w.loose <= 1.0
+
+
+@compiled
+def _estimate_at_end(w: Any, h: float, size_last: float) -> float:
+    """Norm of the local error, filtered through the matrices at the end of the step; given are residuals there, and the
+    noise of the step.
+
+    Where the equations are soft before the first stage, the stages do not see how far the rates before have moved the
+    states, and the matrix at the start hides it.
+    """
+    _set_start_slope(w, h)
+    set_stage(w, stage_count(w.member) - 1, h)
+    for j in range(w.n):
+        w.inputs[1 + w.n + j] += 0.0 if w.algebraic[j] else w.delta[j] - w.ydot[j]
+    evaluate(w, RESIDUAL, w.error)
+    w.residuals += 1
+    for i in range(w.n):
+        w.error[i] -= w.rhs[i]
+    solve_real(w, w.error)
+    if size_last > 0.0:
+        # Rates at the start are slopes of the last step, with the noise of its stages.
+        return float(error_norm(w, MAGNIFIED * max(1.0, h / size_last)))
+    find_noise(w)
+    return float(error_norm(w, MAGNIFIED))
+
+
+@compiled
+def _norm_at_end(w: Any, h: float, size_last: float, is_open: bool, hides: bool) -> float:
+    """Norm of the error as the matrices at the end of the step tell; infinite if they are singular, or if the end of
+    the step is open through them.
+    """
+    copy(w.error, w.columns)
+    if hides:
+        find_noise(w)
+    norm = np.inf
+    if _renew_at_end(w, h):
+        norm = _estimate_at_end(w, h, size_last) if hides else 0.0
+        if is_open and _is_astray(w, h):
+            norm = np.inf
+    copy(w.columns, w.error)
+    return norm
+
+
+@compiled
+def _try_step(w: Any, h: float, repeated: bool, size_last: float) -> tuple[int, float]:
+    """Solve the stages of a step and estimate its error; return the outcome of Newton's method and the norm of the
+    error.
+
+    What the matrix of the step may hide, those at its end tell.
+    """
+    outcome = solve_stages(w, h)
+    if outcome > OPEN:
+        return outcome, np.inf
+    norm = estimate_error(w, h)
+    hides = norm < 1.0 and _may_hide(w, h)
+    if norm >= 1.0 and repeated:
+        norm = min(norm, estimate_again(w, h))
+    if norm < 1.0 and (hides or outcome == OPEN):
+        norm = max(norm, _norm_at_end(w, h, size_last, outcome == OPEN, hides))
+        if norm >= 1.0:
+            w.jacobian_age = INVALID
+    return CONVERGED, norm
 
 
 @compiled
@@ -440,11 +553,8 @@ def advance_implicitly(w: Any, h: float, i: int, size_last: float, norm_last: fl
             continue
         if outcome != GOOD:
             return outcome, h, 0.0, h
-        outcome = solve_stages(w, h)
+        outcome, norm = _try_step(w, h, repeated, size_last)
         if outcome == CONVERGED:
-            norm = estimate_error(w, h)
-            if norm >= 1.0 and repeated:
-                norm = min(norm, estimate_again(w, h))
             if norm < 1.0:
                 proposed = next_size(w, h, norm, size_last, norm_last)
                 return GOOD, h, norm, min(h, proposed) if failed else proposed
