@@ -368,15 +368,15 @@ def _table(curves: Curves, name: str, x: Array, T: Array, f: Array) -> Iterator[
 def power_of_ten(logarithm: float) -> str:
     """Format a number given by its natural logarithm, however large it is.
 
-    >>> power_of_ten(0.0), power_of_ten(1000.0), power_of_ten(-math.inf)
-    ('1', '1.97e+434', '0')
+    >>> power_of_ten(0.0), power_of_ten(1000.0), power_of_ten(-math.inf), power_of_ten(-1e23)
+    ('1', '1.97e+434', '0', '1e-43429448190325178761216')
     """
     if not math.isfinite(logarithm):
         return "0" if logarithm < 0 else str(logarithm)
     if abs(logarithm) < 9:
         return f"{math.exp(logarithm):.4g}"
-    exponent = math.floor(logarithm / math.log(10))
-    return f"{math.exp(logarithm - exponent * math.log(10)):.3g}e{exponent:+03d}"
+    exponent, rest = divmod(logarithm / math.log(10), 1.0)
+    return f"{10**rest:.3g}e{int(exponent):+03d}"
 
 
 def remarks(curves: Curves, temperatures: Span) -> Iterator[str]:
