@@ -621,8 +621,8 @@ def _tolerances(text: str) -> list[float]:
     if not dots:
         return values
     last, first = sorted(values)
-    if not 0 < last <= first:
+    if not 0 < last <= first < math.inf:
         raise InputError(f"'{text}' is no range of tolerances, for example 1e-4..1e-12.", place)
-    count = min(round(math.log10(first / last)), MOST_DECADES)
+    count = min(round(math.log10(first) - math.log10(last)), MOST_DECADES)
     # Rounded to twelve digits, so that a decade is 1e-5 and not 9.999999999999999e-06.
     return [float(f"{first * 10.0**-k:.12g}") for k in range(count + 1)]

@@ -250,6 +250,8 @@ def test_the_command_holds_whatever_was_given_from_python(tmp_path, monkeypatch)
         (["exothermic", "--solvers", ","], "solvers: at least one is needed."),
         (["exothermic", "--tolerances", "tight"], "--tolerances: 'tight' are no tolerances"),
         (["exothermic", "--tolerances", "1e-4..0"], "--tolerances: '1e-4..0' is no range of tolerances"),
+        (["exothermic", "--tolerances", "1e-4..inf"], "--tolerances: '1e-4..inf' is no range of tolerances"),
+        (["exothermic", "--tolerances", "1e-320..1"], "tolerances: 1 is outside its range: >= 1e-13 and <= 0.1."),
         (["exothermic", "--tolerances", "2"], "tolerances: 2 is outside its range: >= 1e-13 and <= 0.1."),
         (["exothermic", "--tolerances", "1e-20"], "tolerances: 1e-20 is outside its range: >= 1e-13 and <= 0.1."),
         (["exothermic", "--variables", "phii"], "variables: no variable 'phii' in the cases. Did you mean 'phi'?"),
