@@ -357,6 +357,10 @@ def _rounding_of(
     now = function(filled)[:, columns]
     found = EPS * np.abs(now)
 
+    def change(moved: Array) -> Array:
+        with np.errstate(invalid="ignore"):  # what stays infinite has changed by nothing more than its last digits
+            return np.nan_to_num(np.abs(function(moved)[:, columns] - now))
+
     def rounding() -> Array:
         rates = np.zeros((len(groups), len(points.t)))
         parts = np.split(found, np.cumsum([len(group) for group in groups[:-1]]), axis=1)
@@ -372,11 +376,11 @@ def _rounding_of(
         if external and not np.array_equal(external.reads(moved), read):
             asking.append(moved)
         else:
-            found += np.nan_to_num(np.abs(function(moved)[:, columns] - now))
+            found += change(moved)
     yield rounding()
     if external:
         for moved in asking:  # only if the surroundings read the changed state
-            found += np.nan_to_num(np.abs(function(external(moved))[:, columns] - now))
+            found += change(external(moved))
             yield rounding()
 
 

@@ -150,13 +150,14 @@ def closest_margin(system: System, program: Program, margins: Sequence[Margin], 
         return None
     seen, t = _values(system, program, result, result.steps)[:, :count], result.steps.t
     before = max(int(np.searchsorted(t, t[-1] * (1 - RESOLVED))) - 1, 0)
-    with np.errstate(invalid="ignore", divide="ignore"):
+    speeds = _speeds(system.states, result)
+    fastest = int(speeds.argmax())
+    with np.errstate(invalid="ignore", divide="ignore"):  # NaN where margins or states stand still
         shrink = seen[-1] / np.fmax.reduce(np.abs(seen), axis=0)
         left = seen[-1] / (seen[before] - seen[-1]) * (t[-1] - t[before])
-    # A margin with an infinite slope at its end, as of bonds that share a load, is still large where time resolves no
-    # more: it closes ever faster, no state faster.
-    speeds = _speeds(system.states, result)
-    steep = result.status in UNRESOLVED and (left * speeds.max() < STEEP) & _is_faster(result, int(speeds.argmax()))
+        # A margin with an infinite slope at its end, as of bonds that share a load, is still large where time resolves
+        # no more: it closes ever faster, no state faster.
+        steep = (left * speeds[fastest] < STEEP) & (result.status in UNRESOLVED and _is_faster(result, fastest))
     closing = terminal & (seen[-1] < seen[before]) & ((left < STALLED * t[-1]) | (shrink < CLOSED_GUARD))
     closing &= (shrink < STALLED) | steep
     nearest = int(np.argmin(np.where(closing, shrink, np.inf)))

@@ -36,6 +36,14 @@ def burst(K_0=0.8, C_r=1e38, C=1e3) -> Simulation:
     return Simulation(load_text(BURST.format(K_0=K_0, C_r=C_r, C=C)))
 
 
+def test_the_rounding_of_what_is_infinite_is_infinite():
+    run = solved("closing-film").trajectory
+    infinite = audit._rounding_of(
+        run, run.result.steps, lambda rows: np.full((len(rows), 1), np.inf), [[0]], np.arange(2)
+    )
+    assert np.all(next(infinite)[0, :2] == np.inf)
+
+
 def test_a_large_body_hides_no_law():
     """The rounding of its heat content, added up over the steps, is more than what is destroyed."""
     solution = burst(C_r=1e38, C=1e11).run()

@@ -22,7 +22,7 @@ from surfacechem.model.assemble import assemble
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Interface, Medium, Scene
 from surfacechem.solve.contract import Status
-from surfacechem.solve.diagnose import beyond_numbers
+from surfacechem.solve.diagnose import beyond_numbers, closest_margin
 
 APART = {"T_1": 300.0, "T_2": 310.0}
 
@@ -107,9 +107,12 @@ def test_a_bound_that_a_loose_tolerance_passes_is_not_told_to_be_passed_by_round
 def test_a_run_that_takes_too_many_steps_says_how_many_and_what_for():
     loading = {"p": Hold(level=5e6), "v": Harmonic(amplitude=1e-2, frequency=50.0)}
     friction = Interface(None, frictions=[Coulomb(mu=0.3)])
-    reason = solve(Scene(bodies(), friction, [], loading, None, 300.0, APART), 10.0, max_steps=1000).reason
-    assert "`run.max-steps` is 1000, and " in reason
-    assert " of them ended at events, or where loads turn" in reason
+    run = solve(Scene(bodies(), friction, [], loading, None, 300.0, APART), 10.0, max_steps=1000)
+    assert "`run.max-steps` is 1000, and " in run.reason
+    assert " of them ended at events, or where loads turn" in run.reason
+    # No margin is told to close where all of them and the states stand still.
+    still = run.result._replace(status=Status.STEP_UNDERFLOW, ydot=np.zeros(2))
+    assert closest_margin(run.system, run.model.program, run.model.margins, still) is None
 
 
 def test_an_interface_whose_balance_is_roundoff_is_named():
