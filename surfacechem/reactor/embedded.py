@@ -157,24 +157,6 @@ def _refuse_folds(system: System) -> None:
         )
 
 
-def _combination(states: Array, accounts: Array) -> Array:
-    """Return the fixed combinations of the rates of states that give those of accounts: [state, account], or zero.
-
-    Rates are given at several samples, a row each, with largest values of one.
-    """
-    # The rate of one state alone is found exactly, though reactions that are fast both ways dominate at random states.
-    largest = np.abs(states).argmax(axis=0)
-    alone = accounts[largest] * np.sign(np.diag(states[largest]))[:, None]
-    rest = np.array([np.abs(accounts - np.outer(*pair)).max(axis=0) for pair in zip(states.T, alone, strict=True)])
-    alone = np.where((np.arange(len(rest))[:, None] == rest.argmin(axis=0)) & (rest < ROUNDED_COMBINATION), alone, 0.0)
-    # States that follow from others, such as the last coverage, would share their part, with their roundoff.
-    states = np.where(np.abs(np.diag(np.linalg.qr(states).R)) < ROUNDED_COMBINATION, 0.0, states)
-    found = np.linalg.lstsq(states, accounts)[0]
-    fits = np.abs(states @ found - accounts).max(axis=0) < ROUNDED_COMBINATION
-    found[np.abs(found) < ROUNDED_COMBINATION] = 0.0
-    return np.where(alone.any(axis=0), alone, np.where(fits, found, 0.0))
-
-
 class EmbeddedScene:
     """The scene of a case with values from the network: temperatures of reactors, heat, factors on its rates.
 
@@ -375,7 +357,20 @@ class EmbeddedScene:
             return np.zeros((count, rates.shape[1] - count))
         largest = np.abs(rates).max(axis=0)
         sizes = np.where(largest > TINY, largest, 1.0)
-        found = _combination(*np.split(rates / sizes, [count], axis=1))
+        states, accounts = np.split(rates / sizes, [count], axis=1)
+        # The rate of one state alone is found exactly, though reactions that are fast both ways dominate at random
+        # states.
+        most = np.abs(states).argmax(axis=0)
+        alone = accounts[most] * np.sign(np.diag(states[most]))[:, None]
+        rest = np.array([np.abs(accounts - np.outer(*pair)).max(axis=0) for pair in zip(states.T, alone, strict=True)])
+        serves = (np.arange(len(rest))[:, None] == rest.argmin(axis=0)) & (rest < ROUNDED_COMBINATION)
+        alone = np.where(serves, alone, 0.0)
+        # States that follow from others, such as the last coverage, would share their part, with their roundoff.
+        states = np.where(np.abs(np.diag(np.linalg.qr(states).R)) < ROUNDED_COMBINATION, 0.0, states)
+        found = np.linalg.lstsq(states, accounts)[0]
+        fits = np.abs(states @ found - accounts).max(axis=0) < ROUNDED_COMBINATION
+        found[np.abs(found) < ROUNDED_COMBINATION] = 0.0
+        found = np.where(alone.any(axis=0), alone, np.where(fits, found, 0.0))
         return np.asarray(found * sizes[count:] / sizes[:count, None])
 
     def moved(self, t: float, x: Array, index: int | None) -> tuple[Array, Array]:

@@ -343,30 +343,25 @@ class ArrayRuns:
 
     def _verdicts(self, found: Ends) -> tuple[Any, Any, Mask]:
         """Return codes of status and reason, and the mask of runs for which both are certain."""
-        model, batch = self.model, found.batch
+        model, batch, n, last = self.model, found.batch, self.n, found.last
         outcome = batch.counts[:, END].copy()
         ended, stopped = outcome == Status.FINISHED, outcome == Status.EVENT
         reason = np.full(len(outcome), self.reasons.index(self.reasons[0]), np.int16)
         whole = model.jumper is None or self.jumps
         clear = ended | (stopped & whole)
         if whole and stopped.any():
-            self._stops(found, stopped, reason, clear)
+            newest = np.clip(batch.counts[:, EVENTS], 1, batch.events.shape[1]) - 1
+            index = batch.events[np.arange(len(outcome)), newest, 0]
+            for j, margin in enumerate(model.margins):
+                hit = np.flatnonzero(stopped & (index == j))
+                if len(hit):  # a run that its own rates lead back from its limit is not certain
+                    t, y, parameters = last[hit, 0], last[hit, 1 : 1 + n], last[hit, 1 + 2 * n :]
+                    led = are_led_back(model.system, model.program, margin, t, y, parameters)
+                    reason[hit] = self.reasons.index(margin.reason)
+                    clear[hit] &= ~led & (margin.below is None)
         elif not whole:  # a gap may have closed without an event
             clear &= all_above(batch.ends[:, -model.program.n_margins :], -PICOMETRE, self.impacts)
         return stopped * np.int8(STATUSES.index("stopped")), reason, clear
-
-    def _stops(self, found: Ends, stopped: Mask, reason: Any, clear: Mask) -> None:
-        """Set the reasons of runs stopped by a limit; a run that its own rates lead back from it is not certain."""
-        model, batch, n, last = self.model, found.batch, self.n, found.last
-        newest = np.clip(batch.counts[:, EVENTS], 1, batch.events.shape[1]) - 1
-        index = batch.events[np.arange(len(stopped)), newest, 0]
-        for j, margin in enumerate(model.margins):
-            hit = np.flatnonzero(stopped & (index == j))
-            if len(hit):
-                t, y, parameters = last[hit, 0], last[hit, 1 : 1 + n], last[hit, 1 + 2 * n :]
-                led = are_led_back(model.system, model.program, margin, t, y, parameters)
-                reason[hit] = self.reasons.index(margin.reason)
-                clear[hit] &= ~led & (margin.below is None)
 
     def _values(self, rows: Array) -> Values:
         """Return states, and what is kept or balanced, at rows of arguments: the table, and its columns by name."""

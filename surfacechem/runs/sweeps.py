@@ -487,7 +487,14 @@ class SweepSolution(Results):
             if self.accuracy and which in self.accuracy.exact:
                 exact = self.accuracy.exact[which]
                 columns.append(self._of_each(f"{name}_exact", exact, unit, f"exact {text}"))
-        return (*columns, *([self._lifetime(columns)] if self.statistic_names and self.plan.load else []))
+        if self.statistic_names and self.plan.load:
+            known = {column.name: column for column in columns}
+            # A load that ends runs is linear in time; any other is refused.
+            speed = np.diff(known[self.inner].values[:2]) / np.diff(known["time"].values[..., :2], axis=-1)
+            values = spectrum.lifetimes(known["survival"].values, known[f"density_{self.inner}"].values, speed)
+            text = f"mean lifetime at a constant {known[self.inner].long_name}, of bonds without memory"
+            columns.append(Column("lifetime", (*shape, self.inner), values, "s", text))
+        return tuple(columns)
 
     def _single(self) -> Iterator[Column]:
         """Yield the last, largest and smallest values of each run, which may lie between the shared output times."""
@@ -496,15 +503,6 @@ class SweepSolution(Results):
             for which, words in SINGLE_COLUMNS.items():
                 own = f"{DATASET_NAMES.get(name, name)}_{which}"
                 yield self._of_each(own, [run[which][name] for run in found], q.unit, f"{q.long_name} {words}")
-
-    def _lifetime(self, columns: Sequence[Column]) -> Column:
-        """Return lifetimes over the load, which grows at a constant rate along each run."""
-        known, load = {column.name: column for column in columns}, self.inner
-        # A load that ends runs is linear in time; any other is refused.
-        speed = np.diff(known[load].values[:2]) / np.diff(known["time"].values[..., :2], axis=-1)
-        values = spectrum.lifetimes(known["survival"].values, known[f"density_{load}"].values, speed)
-        text = f"mean lifetime at a constant {known[load].long_name}, of bonds without memory"
-        return Column("lifetime", (*self.axes, load), values, "s", text)
 
     def _coordinates(self, load: Column | None) -> list[Column]:
         """Return the swept parameters, and the times or, if a load ends the runs, the values of this load."""

@@ -331,17 +331,6 @@ def _are_pending(w: Any, pending: Any) -> bool:
 
 
 @compiled
-def _conclude_all(w: Any) -> None:
-    """Decide about the trial steps. A usual one is accepted: it passes, and nothing happens in it."""
-    usual = (lanes(w.norm) < 1.0) & (lanes(w.defect_at) == 1.0) & (lanes(w.crossing) == 1.0) & (lanes(w.onto) < 0.5)
-    usual = usual & ~(lanes(w.next_output) <= lanes(w.t_new)) & (lanes(w.again) < 0.5)
-    put(w.taken, where(usual, lanes(w.busy), 0.0))
-    for lane in range(LANES if _are_pending(w, ~usual) else 0):
-        if w.pending[lane] > 0.5:
-            _conclude(w, lane)
-
-
-@compiled
 def _continue_all(w: Any) -> None:
     """Go on after the steps: where one ends at an event, a segment or the run; where a run is given up."""
     taken = lanes(w.taken) > 0.5
@@ -410,7 +399,13 @@ def _step(w: Any) -> None:
         if shown:
             w.check_outputs(w)
         find_crossings(w, good & (lanes(w.defect_at) == 1.0), close)
-    _conclude_all(w)
+    # A usual step is accepted: it passes, and nothing happens in it.
+    usual = (lanes(w.norm) < 1.0) & (lanes(w.defect_at) == 1.0) & (lanes(w.crossing) == 1.0) & (lanes(w.onto) < 0.5)
+    usual = usual & ~(lanes(w.next_output) <= lanes(w.t_new)) & (lanes(w.again) < 0.5)
+    put(w.taken, where(usual, lanes(w.busy), 0.0))
+    for lane in range(LANES if _are_pending(w, ~usual) else 0):
+        if w.pending[lane] > 0.5:
+            _conclude(w, lane)
     _move_on(w)
     _continue_all(w)
     _write_margins(w)
