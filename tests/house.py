@@ -2,7 +2,6 @@
 
     python tests/house.py                    every figure beside its bound
     python tests/house.py where FIGURE       where a figure is from, the largest part first
-    python tests/house.py journey CASE       the modules that one case passes through, with the functions it calls
     python tests/house.py --tighten          write the figures that are better than their bounds
 
 house.toml has the bounds, and test_house.py fails where a figure is worse. ``--tighten`` never loosens one: where the
@@ -21,7 +20,6 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
-from types import FrameType
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "surfacechem"
@@ -313,24 +311,6 @@ def table() -> str:
     return f"{'':50}{'now':>9}{'bound':>9}\n{body}"
 
 
-def journey(case: str) -> str:
-    """The modules that a run of a case passes through, and how many functions of each it calls."""
-    import surfacechem
-
-    entered: dict[str, set[str]] = defaultdict(set)
-
-    def watch(frame: FrameType, event: str, _: object) -> None:
-        file = Path(frame.f_code.co_filename)
-        if event == "call" and file.is_relative_to(PACKAGE):
-            entered[file.relative_to(ROOT).as_posix()].add(frame.f_code.co_qualname)
-
-    sys.setprofile(watch)
-    surfacechem.load(case).run()
-    sys.setprofile(None)
-    rows = "".join(f"  {module}  {len(names)}\n" for module, names in entered.items())
-    return f"{case}: {len(entered)} modules, {sum(map(len, entered.values()))} functions\n{rows}"
-
-
 def main(arguments: list[str]) -> None:
     match arguments:
         case []:
@@ -339,8 +319,6 @@ def main(arguments: list[str]) -> None:
             tighten()
         case ["where", title]:
             print("".join(f"{part:9g}  {place}\n" for place, part in figures()[title].worst()), end="")
-        case ["journey", name]:
-            print(journey(name), end="")
         case _:
             sys.exit(__doc__)
 

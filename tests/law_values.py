@@ -29,11 +29,8 @@ USUAL = {
     "1/K": 1e-3, "Pa s": 0.1, "W/(m K)": 0.1, "J/(mol K)": 8.0, "J/m^2": 0.1, "m^2": 1e-12, "Pa/m": 1e14,
 }  # fmt: skip
 """Size of the numbers that are drawn, by unit; others are about one."""
-MORE_UNITS = (
-    {"r": "m"}
-    | dict.fromkeys(("T_0", "T", "T_from", "T_to", "T_1", "T_2", "x"), "K")
-    | {"mu": "J", "N_c": "1/m^2", "r": "m"}
-)
+MORE_UNITS = {"r": "m", "mu": "J", "N_c": "1/m^2"}
+MORE_UNITS |= dict.fromkeys(("T_0", "T", "T_from", "T_to", "T_1", "T_2", "x"), "K")
 SIGNED = {"v", "v_2", "v_n", "v_t", "g_n", "g_t", "u_t", "f", "mu", "t_n", "dmu_dphi", "direction", "direction_2"}
 AT = {"times": 1.0, "pressures": 1e5, "gaps": 1e-9}
 LISTS = {name: (0.0, 0.8 * size, 1.6 * size) for name, size in AT.items()}

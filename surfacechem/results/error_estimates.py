@@ -337,21 +337,16 @@ def of_named(ours: Trajectory, theirs: Trajectory) -> dict[str, float]:
     with np.errstate(invalid="ignore"):  # infinite values of both are equal
         missed = np.fmax(np.abs(first.outputs - true) - rounded, 0.0)
     errors = np.fmax.reduce(np.divide(missed, size, out=np.zeros_like(missed), where=size > 0), initial=0.0)
-    nothing = _squares(ours.run.rtol, second.sample, state_floors(theirs)) if errors.max(initial=0) > NEGLIGIBLE else ()
-    return {name: error for name, error in zip(names, errors.tolist(), strict=True) if name not in nothing}
-
-
-def _squares(rtol: float, trajectory: Trajectory, least: Array) -> list[str]:
-    """Return the named quantities that never exceed the effect of errors of this relative size of the states, an effect
-    that is quadratic in them.
-
-    The energy of a spring at zero extension is an example: no digit of such a zero is known, and none is missed.
-    """
-    changes = rtol * np.maximum(np.abs(trajectory.result.outputs), least)
-    made, by_less = (trajectory.sensitivities(each) for each in (changes, changes / FINER_BY))
-    largest = np.abs(trajectory.outputs).max(axis=0, initial=0.0)
+    named, sample = dict(zip(names, errors.tolist(), strict=True)), second.sample
+    if errors.max(initial=0) <= NEGLIGIBLE:
+        return named
+    # Left out are quantities that never exceed the effect of errors within the tolerance of the states, an effect that
+    # is quadratic in them, such as the energy of a spring at zero extension: no digit of it is known.
+    changes = ours.run.rtol * np.maximum(np.abs(sample.result.outputs), state_floors(theirs))
+    made, by_less = (sample.sensitivities(each) for each in (changes, changes / FINER_BY))
+    largest = np.abs(sample.outputs).max(axis=0, initial=0.0)
     squares = (largest <= made) & (2 * FINER_BY * by_less <= made)
-    return [name for name, is_one in zip(trajectory.model.system.output_columns, squares, strict=True) if is_one]
+    return {name: error for (name, error), left_out in zip(named.items(), squares, strict=True) if not left_out}
 
 
 def _named_sizes(trajectory: Trajectory, columns: list[int]) -> Array:

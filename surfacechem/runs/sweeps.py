@@ -476,7 +476,14 @@ class SweepSolution(Results):
         load = along.pop(self.inner, None)
         species = coverage_columns(self.system, along.values())
         columns = [*self._coordinates(load), *along.values(), *species, *self._of_runs()]
-        columns += [*event_columns(self.runs, shape), *self._single()]
+        columns += event_columns(self.runs, shape)
+        # Of each run the last, largest and smallest values, which may lie between the shared output times.
+        single = [{"last": at_end(run), **extremes(run)} for run in self.runs]
+        for name, q in quantities(self.system).items():
+            for which, words in SINGLE_COLUMNS.items():
+                own = f"{DATASET_NAMES.get(name, name)}_{which}"
+                each = [run[which][name] for run in single]
+                columns.append(self._of_each(own, each, q.unit, f"{q.long_name} {words}"))
         for which in self.statistic_names:
             name, unit, text = which, "s", "mean lifetime"
             if self.plan.load:
@@ -495,14 +502,6 @@ class SweepSolution(Results):
             text = f"mean lifetime at a constant {known[self.inner].long_name}, of bonds without memory"
             columns.append(Column("lifetime", (*shape, self.inner), values, "s", text))
         return tuple(columns)
-
-    def _single(self) -> Iterator[Column]:
-        """Yield the last, largest and smallest values of each run, which may lie between the shared output times."""
-        found = [{"last": at_end(run), **extremes(run)} for run in self.runs]
-        for name, q in quantities(self.system).items():
-            for which, words in SINGLE_COLUMNS.items():
-                own = f"{DATASET_NAMES.get(name, name)}_{which}"
-                yield self._of_each(own, [run[which][name] for run in found], q.unit, f"{q.long_name} {words}")
 
     def _coordinates(self, load: Column | None) -> list[Column]:
         """Return the swept parameters, and the times or, if a load ends the runs, the values of this load."""

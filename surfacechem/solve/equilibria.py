@@ -134,14 +134,6 @@ def stiffness(driving: Field, scale: Array, at: Array) -> Array:
     return np.asarray(((ahead - behind) / (2 * CBRT_EPS * scale)[:, None]).T)
 
 
-def stiffness_ahead(driving: Field, nudges: Array) -> Array:
-    """Return the stiffness at the start of displacements in these directions, from differences over them alone: at
-    touch it is another one behind.
-    """
-    still, *ahead = driving(np.vstack([np.zeros(len(nudges)), np.diag(nudges)]))
-    return np.asarray(((np.array(ahead) - still) / nudges[:, None]).T)
-
-
 def unstable_direction(change: Array) -> Array | None:
     """Return the fastest growing eigenvector of an imbalance, its largest entry 1; None if all decay (stable)."""
     growth, ways = np.linalg.eig(change)
@@ -582,7 +574,10 @@ class Equilibria:
         tractions = sliding if sliding.any() else self._tangents(point.inputs())[2::3]
         if not tractions[free.which].any():
             return None
-        change = stiffness_ahead(free.driving, np.where(tractions[free.which] < 0, -CBRT_EPS, CBRT_EPS) * free.scale)
+        # From differences in the direction of the tractions alone: at touch the stiffness is another one behind.
+        nudges = np.where(tractions[free.which] < 0, -CBRT_EPS, CBRT_EPS) * free.scale
+        still, *ahead = free.driving(np.vstack([np.zeros(len(nudges)), np.diag(nudges)]))
+        change = ((np.array(ahead) - still) / nudges[:, None]).T
         found = unstable_direction(change) if np.all(np.isfinite(change)) else None
         weights = np.zeros(len(sliding))
         weights[free.which] = 0.0 if found is None else found

@@ -234,29 +234,33 @@ class Jumper:
     def edge_tables(self) -> EdgeTables:
         """Tables of the edges for the compiled loop; functions that only jumps need once jumps are expected."""
         with _ONE_THREAD:
-            self._tables = self._tables or self._edge_tables()
+            if self._tables:
+                return self._tables
+            system, nodes = self.system, list(self._heat.nodes.values()) if self.system.edges else []
+            functions: list[Function | None] = [self.magnitudes, *[None] * (4 + len(system.edges))]
+            if self._jumps and system.edges:
+                node_values = self._heat.node_values if nodes else None
+                functions[1:] = (
+                    self.guard_rates,
+                    self._total_functions,
+                    node_values,
+                    self.times_of_return,
+                    *self._resets,
+                )
+            starts = [j for j, p in enumerate(system.parameters) if p.path == START]
+            reset = len(system.states) + len(self.mode_columns)
+            self._tables = EdgeTables(
+                sizes=_integers((4 + len(system.far_work), len(nodes) * (3 + len(system.sinks)), reset), 3),
+                code=_integers([(f.address, f.user) if f else (0, 0) for f in functions], -1, 2),
+                edges=_integers([self._row(edge) for edge in system.edges], -1, 5),
+                when=_integers(system.guard_conditions, -1, 3),
+                held=_integers(self.mode_columns, -1),
+                clocks=_integers([*starts, *system.origins], -1),
+                nodes=_integers([-1 if node.prescribed else system.state_columns[node.node] for node in nodes], -1),
+                accounts=_integers(self._accounts, -1, 2),
+                least_peaks=velocity_scales(system),
+            )
             return self._tables
-
-    def _edge_tables(self) -> EdgeTables:
-        system, given = self.system, list(self.system.far_work)
-        nodes = list(self._heat.nodes.values()) if system.edges else []
-        functions: list[Function | None] = [self.magnitudes, *[None] * (4 + len(system.edges))]
-        if self._jumps and system.edges:
-            node_values = self._heat.node_values if nodes else None
-            functions[1:] = self.guard_rates, self._total_functions, node_values, self.times_of_return, *self._resets
-        starts = [j for j, p in enumerate(system.parameters) if p.path == START]
-        sizes = 4 + len(given), len(nodes) * (3 + len(system.sinks)), len(self.system.states) + len(self.mode_columns)
-        return EdgeTables(
-            sizes=_integers(sizes, 3),
-            code=_integers([(f.address, f.user) if f else (0, 0) for f in functions], -1, 2),
-            edges=_integers([self._row(edge) for edge in system.edges], -1, 5),
-            when=_integers(system.guard_conditions, -1, 3),
-            held=_integers(self.mode_columns, -1),
-            clocks=_integers([*starts, *system.origins], -1),
-            nodes=_integers([-1 if node.prescribed else self.system.state_columns[node.node] for node in nodes], -1),
-            accounts=_integers(self._accounts, -1, 2),
-            least_peaks=velocity_scales(system),
-        )
 
     def _row(self, edge: Edge) -> tuple[int, int, bool, int, bool]:
         """Return a row of the table of edges."""

@@ -334,28 +334,20 @@ def _agrees(w: Any, lane: int, x: Any) -> Any:
 
 
 @compiled
-def _may_be_narrow(w: Any) -> Any:
-    """Mask of lanes in whose steps the equations may change within less than the stages resolve."""
-    wide = lanes(w.stiff) < 0.5
-    for m in range(w.n):
-        if w.divisors[m]:
-            part, first, last = lanes(w.h) / 3.0, lanes(w.y[m]), lanes(w.y_new[m])
-            near, far = first + part * lanes(w.k[0, m]), last - part * lanes(w.k[w.end_stage, m])
-            least, most = (
-                smaller(smaller(first, near), smaller(far, last)),
-                larger(larger(first, near), larger(far, last)),
-            )
-            wide = wide & ((least > explicit.SMOOTH_PART * most) | (most < explicit.SMOOTH_PART * least))
-    return ~wide
-
-
-@compiled
 def needs_checks(w: Any, good: Any) -> bool:
     """Set the whole spacings of each step; True if the equations are to be checked somewhere inside one."""
     h, spacing = lanes(w.h), lanes(w.spacing_of)
     checked = good & (h > CHECK_PART * spacing)
-    if w.divisors.shape[0] > 0:
-        checked = checked & _may_be_narrow(w)
+    if w.divisors.shape[0] > 0:  # elsewhere the equations change within no less than the stages resolve
+        wide = lanes(w.stiff) < 0.5
+        for m in range(w.n):
+            if w.divisors[m]:
+                first, last = lanes(w.y[m]), lanes(w.y_new[m])
+                near, far = first + h / 3.0 * lanes(w.k[0, m]), last - h / 3.0 * lanes(w.k[w.end_stage, m])
+                least = smaller(smaller(first, near), smaller(far, last))
+                most = larger(larger(first, near), larger(far, last))
+                wide = wide & ((least > explicit.SMOOTH_PART * most) | (most < explicit.SMOOTH_PART * least))
+        checked = checked & ~wide
     put(w.spacings, where(checked, floor(h / spacing), -1.0))
     at_ends = lanes(w.begins) + lanes(w.last) + lanes(w.onto) > 0.5
     return bool(any_lane((lanes(w.spacings) >= 0.0) & (at_ends | (lanes(w.spacings) > 0.5))))
