@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import mpmath
 import thermodynamics as laws
 from zoo import MEMBERS, Member
 
@@ -49,10 +48,7 @@ def away(member: Member) -> tuple[System, dict[Any, Any]]:
     """A scene in its modes, and a point away from equilibrium, with rates drawn at random."""
     system, draw = member.system, random.Random(member.name)
     point = laws.start_point(system, 0, member.modes)
-    for state in system.states:
-        size = abs(float(point[state.symbol])) or state.scale
-        point[state.symbol] += mpmath.mpf(size * draw.uniform(0.01, 0.05))
-        point[state.dot] = mpmath.mpf(size * draw.uniform(-1, 1))
+    laws.put_away(system, point, lambda _: draw)
     return system, point
 
 

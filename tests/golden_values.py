@@ -23,7 +23,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import mpmath
 import numpy as np
 import thermodynamics as laws
 from case_runs import load
@@ -87,11 +86,7 @@ def equations(name: str) -> dict[str, float]:
     """Every row, named quantity, account and limit of a case in its modes at the start, away from equilibrium."""
     system = assemble(spatial.few(load(name).case.scene))
     point = laws.start_point(system, 0)
-    for state in system.states:
-        draw = random.Random(state.name)
-        size = abs(float(point[state.symbol])) or state.scale
-        point[state.symbol] += mpmath.mpf(size * draw.uniform(0.01, 0.05))
-        point[state.dot] = mpmath.mpf(size * draw.uniform(-1, 1))
+    laws.put_away(system, point, random.Random)
     parts = {f"row {row}": expression for row, expression in system.rows.items()}
     parts |= {f"output {item.name}": item.expression for item in system.outputs}
     parts |= {f"account {account.quantity.name}": account.rate for account in system.ledger}

@@ -2,6 +2,9 @@
 
 from hypothesis import strategies as st
 
+from surfacechem.errors import InputError
+from surfacechem.format import load_text
+
 
 def places_of(value, path=()):
     """The path of every value of a document."""
@@ -60,3 +63,12 @@ def garbled(text, data):
         end = min(len(text), start + data.draw(st.integers(0, 12)))
         text = text[:start] + data.draw(st.text("aT0 .:-[]{}#&*!|>'\"%@\n\t\0e", max_size=6)) + text[end:]
     return text
+
+
+def refusal(text, folder="."):
+    """The error of a text that is no case, beside files in a folder, else None."""
+    try:
+        load_text(text, "fuzz", folder).system()
+    except InputError as error:
+        return error
+    return None

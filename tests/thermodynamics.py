@@ -1,7 +1,7 @@
 """Both laws of thermodynamics on assembled equations, to 40 digits: no solver is involved."""
 
 import random
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import mpmath
 import symengine
@@ -72,6 +72,15 @@ def start_point(system: System, seed: int, modes: Mapping[str, float] | None = N
         if state.name in ("v", "speed") and "slip" in (modes or {}):
             point[state.symbol] *= mpmath.mpf(modes["slip"])
     return point
+
+
+def put_away(system: System, point: dict, draw_of: Callable[[str], random.Random]) -> None:
+    """Move a point away from equilibrium, with rates drawn at random."""
+    for state in system.states:
+        draw = draw_of(state.name)
+        size = abs(float(point[state.symbol])) or state.scale
+        point[state.symbol] += mpmath.mpf(size * draw.uniform(0.01, 0.05))
+        point[state.dot] = mpmath.mpf(size * draw.uniform(-1, 1))
 
 
 def consistent_point(system: System, seed: int, modes: Mapping[str, float] | None = None) -> dict:

@@ -6,11 +6,11 @@ from functools import cache
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mutants import garbled, mutated
+from mutants import garbled, mutated, refusal
 
 from surfacechem.documents import document
 from surfacechem.errors import InputError, Place
-from surfacechem.format import load, load_text, names
+from surfacechem.format import load, names
 
 pytestmark = pytest.mark.around
 
@@ -43,15 +43,6 @@ def sample(name):
     """The text of a case and its plain data, which nothing here changes."""
     text = load(name).text
     return text, document.parse(text).plain()
-
-
-def refusal(text):
-    """The error of a text that is no case, else None."""
-    try:
-        load_text(text, "fuzz").system()
-    except InputError as error:
-        return error
-    return None
 
 
 def loads_or_is_refused(text):

@@ -9,14 +9,13 @@ from functools import cache
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mutants import garbled, mutated
+from mutants import garbled, mutated, refusal
 from ruamel.yaml import YAML
 
 from mechanisms import SHIPPED
 from surfacechem.documents import document, mechanisms
 from surfacechem.documents.document import Limits
 from surfacechem.errors import InputError, Place
-from surfacechem.format import load_text
 from surfacechem.mechanism import load_mechanism, source
 from surfacechem.mechanism.rates import AffinityReaction, kinds
 
@@ -236,14 +235,6 @@ def is_read_or_refused(text, file, solver):
         assert error.place.file
         assert str(error).isprintable()
         assert len(str(error)) < 2000
-
-
-def refusal(case, folder):
-    try:
-        load_text(case, "fuzz", folder).system()
-    except InputError as error:
-        return error
-    return None
 
 
 @pytest.mark.parametrize("examples", [15, pytest.param(3000, marks=pytest.mark.slow)])
