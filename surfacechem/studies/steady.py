@@ -297,11 +297,15 @@ class _Rest:
         return np.asarray(self.model.output_function(self.evaluation.inputs)[[system.output_columns["E_total"]]])
 
     def _solve(self, slopes: Array, right: Array, x: Array) -> Array:
-        """Return the change of the state that changes the rates by ``right`` and keeps what is conserved unchanged."""
+        """Return the change of the state that changes the rates by ``right`` and keeps what is conserved unchanged; NaN
+        where there are no rates.
+        """
         sizes = self._sizes(x)
         kept = np.vstack((self._conserved * sizes, self._slopes(self._energy, x)))
         still = np.diag(~slopes.any(axis=1))  # a state that nothing moves stays what it is
         matrix = np.vstack((slopes + still, kept))
+        if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(right))):
+            return np.full(len(x), np.nan)
         # Rows are scaled, since rates and conserved sums differ by many decades.
         rows = np.maximum(np.abs(matrix).max(axis=1), TINY)
         found, *_ = np.linalg.lstsq(matrix / rows[:, None], np.append(right, np.zeros(len(kept))) / rows, rcond=None)

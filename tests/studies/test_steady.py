@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from surfacechem.errors import InputError
-from surfacechem.studies.steady import steady
+from surfacechem.studies.steady import _Rest, steady
 
 pytestmark = pytest.mark.around
 
@@ -132,6 +132,17 @@ def test_a_state_that_a_trace_leaves_is_not_the_steady_state(tmp_path):
     reactions = {"a(s) + b(s) => 2 b(s)": (1, 0), "b(s) => a(s)": (0.1, 0), "a(s) => b(s)": (1e-14, 0)}
     found = one_way(tmp_path, HELD, {"a": 0, "b": 0}, reactions, of=["R_R3"])
     assert found.coverages == pytest.approx({"a(s)": 0.1, "b(s)": 0.9})
+
+
+def test_a_search_that_leaves_the_range_of_numbers_begins_again_later(tmp_path, monkeypatch):
+    """Where rates hardly change with the coverage, Newton's method goes to where those of Cantera are not numbers."""
+    rates = _Rest.rates
+    monkeypatch.setattr(_Rest, "rates", lambda rest, x: rates(rest, x) if np.abs(x).max() < 100 else x * np.nan)
+    strength, k = 5.0, np.exp(5.0) / 4
+    barrier = f"0}}, coverage-dependencies: {{a(s): {{a: 0, m: 0, E: {strength * 8.31446261815324 * 0.5}}}"
+    reactions = {"b(s) => a(s)": (1, 0), "a(s) => b(s)": (k, barrier)}
+    a = one_way(tmp_path, HELD, {"a": 0, "b": 0}, reactions, of=["R_R1"]).coverages["a(s)"]
+    assert k * a * np.exp(-strength * a) == pytest.approx(1 - a, rel=1e-9)
 
 
 def test_a_case_that_loses_no_heat_keeps_its_energy(tmp_path):
