@@ -69,6 +69,9 @@ EXPLICIT_MEMORY = {
 }
 """Arrays of the loop with explicit steps."""
 
+_END_SLOPES = {**_arrays("end_jacobian", "n", "n"), **_arrays("end_time_slopes", "n")}
+"""Derivatives of the rates at the end of a step, as those at its start."""
+
 RADAU_MEMORY = {
     **MEMORY,
     # rates at the start and at the stages, and the correction of the polynomial; of the last step at its stages
@@ -82,6 +85,7 @@ RADAU_MEMORY = {
     # (system, real and imaginary part), overwritten by their factors, with flags of the rows that are exchanged
     **_arrays("jacobian", "n", "n"),
     **_arrays("time_slopes", "n"),
+    **_END_SLOPES,
     **_arrays("matrix", 3, 2, "n", "n"),
     **_arrays("exchanged", 3, "n", "n"),
     # Newton's method: contraction, now and of the last step; error of the first guess
@@ -100,6 +104,7 @@ ROSENBROCK_MEMORY = {
     **_arrays("weight", "n"),
     **MEMORY,
     # the real matrix for checks against the equations, with flags of the rows that are exchanged, and right-hand sides
+    **_END_SLOPES,
     **_arrays("matrix", 1, 2, "n", "n"),
     **_arrays("exchanged", 1, "n", "n"),
     **_arrays("imaginary rhs", "n"),

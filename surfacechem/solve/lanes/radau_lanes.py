@@ -54,7 +54,7 @@ from surfacechem.solve.radau.linear import PIVOT_PART
 from surfacechem.solve.radau.outputs import POLYNOMIAL_ERROR
 from surfacechem.solve.radau.step import CONTRACTING, LEAST_CONVERGENT, MIN_GROWTH, SAFETY
 from surfacechem.solve.radau.work import JACOBIAN, RATES, RESIDUAL, compiled, evaluate, evaluate_at, weighted_sums
-from surfacechem.tolerances import EPS, FORMULA_EPS, NEGLIGIBLE, NEWTON_EPS, TINY, ULPS, UNEQUAL
+from surfacechem.tolerances import EPS, FORMULA_EPS, NEGLIGIBLE, NEWTON_EPS, TINY, UNEQUAL
 
 MEMBER, STAGES = 1, 5
 """Member of the family in these steps, and its number of stages."""
@@ -94,13 +94,13 @@ _defect_at_start = weighted_sums(np.array([[1.0, *-tables.START_RATE[MEMBER, :ST
 
 
 @compiled
-def differentiate(w: Any) -> None:
+def differentiate(w: Any, jacobian: Any) -> None:
     """Evaluate the derivatives of the rates at the inputs, in units of the weights."""
-    evaluate(w, JACOBIAN, w.jacobian)
+    evaluate(w, JACOBIAN, jacobian)
     for i in range(w.n):
         unit = 1.0 / lanes(w.weight[i])
         for j in range(w.n):
-            put(w.jacobian[i, j], lanes(w.jacobian[i, j]) * (lanes(w.weight[j]) * unit))
+            put(jacobian[i, j], lanes(jacobian[i, j]) * (lanes(w.weight[j]) * unit))
 
 
 @compiled
@@ -119,7 +119,7 @@ def _exchange(re: Any, im: Any, flags: Any, k: int) -> None:
 
 
 @compiled
-def factor(w: Any, s: int, real: Any, imaginary: Any) -> None:
+def factor(w: Any, s: int, jacobian: Any, real: Any, imaginary: Any) -> None:
     """Factor matrix s, J subtracted from a complex number on the diagonal; pivots are replaced by their inverses.
 
     Where a matrix is singular the factors, and all that is found with them, are not finite.
@@ -127,9 +127,9 @@ def factor(w: Any, s: int, real: Any, imaginary: Any) -> None:
     n, re, im = w.n, w.matrix[s, 0], w.matrix[s, 1]
     for i in range(n):
         for j in range(n):
-            put(re[i, j], 0.0 - lanes(w.jacobian[i, j]))
+            put(re[i, j], 0.0 - lanes(jacobian[i, j]))
             put(im[i, j], 0.0)
-        put(re[i, i], real - lanes(w.jacobian[i, i]))
+        put(re[i, i], real - lanes(jacobian[i, i]))
         put(im[i, i], imaginary)
     for k in range(n):
         _exchange(re, im, w.exchanged[s], k)
@@ -296,22 +296,61 @@ def are_open(w: Any, residual: Any, unit: Any, rates: Any) -> Any:
 
 
 @compiled
-def norm_at_end(w: Any, s: int, diagonal: Any) -> Any:
-    """The norm of what the equations at the inputs, the end of the step, are open by (``rhs``), through the matrix
-    there, which overwrites matrix s; roundoff is left out.
+def _leave_roundoff_out(w: Any, gap: Any) -> None:
+    """Leave out of what the equations at the inputs are open by what may be roundoff of the states, by how much the
+    equations change when the states move by their weights; the inputs move.
     """
-    differentiate(w)
-    factor(w, s, diagonal, same(0.0))
+    evaluate(w, RESIDUAL, w.imaginary)
+    _move_states(w)
+    evaluate(w, RESIDUAL, w.rates)
+    part = same(0.0)
+    for m in range(w.n):
+        part = larger(part, newton.ROUNDINGS * EPS * absolute(lanes(w.y_new[m])) / lanes(w.weight[m]))
+    for m in range(w.n):
+        left, change = lanes(gap[m]), absolute(lanes(w.rates[m]) - lanes(w.imaginary[m]))
+        put(gap[m], where(absolute(left) > part * change, left, 0.0))
+
+
+@compiled
+def _norm_by_diagonal(w: Any, diagonal: Any, gap: Any) -> Any:
+    """A bound of the norm of what the equations at the end of the step are open by, through the matrix there, by the
+    series in what is not on its diagonal; infinite where this does not halve the first term.
+    """
+    first, second = same(0.0), same(0.0)
     for i in range(w.n):
-        terms, unit, left = same(0.0), lanes(w.weight[i]), lanes(w.rhs[i])
+        pivot = absolute(diagonal - lanes(w.end_jacobian[i, i]))
+        size = absolute(lanes(gap[i])) / (lanes(w.weight[i]) * pivot)
+        put(w.rhs[i], size)
+        first = where(size <= first, first, size)  # not larger(): NaN must be seen
+    for i in range(w.n):
+        total = same(0.0)
         for j in range(w.n):
-            terms = terms + absolute(lanes(w.jacobian[i, j]) * lanes(w.inputs[1 + j])) * (unit / lanes(w.weight[j]))
-        put(w.rhs[i], where(absolute(left) > ULPS * terms, left, 0.0))
-        put(w.imaginary[i], 0.0)
-    solve(w, s, w.rhs, w.imaginary)
-    put_start(w)
-    differentiate(w)
-    return error_norm(w, w.rhs)
+            if j != i:
+                total = total + absolute(lanes(w.end_jacobian[i, j])) * lanes(w.rhs[j])
+        size = total / absolute(diagonal - lanes(w.end_jacobian[i, i]))
+        second = where(size <= second, second, size)
+    return where(second <= 0.5 * first, 2.0 * first, np.inf)
+
+
+@compiled
+def norm_at_end(w: Any, s: int, diagonal: Any, gap: Any, hides: Any) -> Any:
+    """The norm, in the lanes in which the matrix of the step hides it, of what the equations at the inputs, the end of
+    the step, are open by, through the matrix there, which overwrites matrix s; zero in others.
+
+    Equations may have become much softer than the matrix of the step. What may be roundoff does not count.
+    """
+    differentiate(w, w.end_jacobian)
+    norm = where(hides, _norm_by_diagonal(w, diagonal, gap), 0.0)
+    hides = ~(norm < 1.0)
+    if any_lane(hides):
+        factor(w, s, w.end_jacobian, diagonal, same(0.0))
+        _leave_roundoff_out(w, gap)
+        for m in range(w.n):
+            put(w.rhs[m], lanes(gap[m]))
+            put(w.imaginary[m], 0.0)
+        solve(w, s, w.rhs, w.imaginary)
+        norm = where(hides, error_norm(w, w.rhs), norm)
+    return norm
 
 
 @compiled
@@ -319,8 +358,7 @@ def _are_astray(w: Any) -> Any:
     """Mask of lanes in which Newton's method ends at a wrong state, because equations have become much softer than its
     matrix: its last corrections are small and close no gap.
 
-    The equations at the end of the step are then open by more than the tolerance, through the matrix there. How far
-    they were open before the last correction is in ``error``.
+    How far the equations at the end of the step were open before the last correction is in ``error``.
     """
     diagonal = EIGENVALUES[0].real / lanes(w.h)
     astray = are_open(w, w.error, diagonal, w.k[STAGES])
@@ -329,11 +367,11 @@ def _are_astray(w: Any) -> Any:
         _put_stage(w, STAGES - 1)
         evaluate(w, RESIDUAL, w.rhs)
         for m in range(w.n):
-            put(w.rhs[m], lanes(w.k[STAGES, m]) - lanes(w.rhs[m]))
-        astray = astray & are_open(w, w.rhs, diagonal, w.k[STAGES])
+            put(w.error[m], lanes(w.k[STAGES, m]) - lanes(w.rhs[m]))
+        astray = astray & are_open(w, w.error, diagonal, w.k[STAGES])
     if any_lane(astray):
         # In place of a matrix of a pair, which serves no more.
-        astray = astray & ~(norm_at_end(w, 1, diagonal) <= 1.0)
+        astray = ~(norm_at_end(w, 1, diagonal, w.error, astray) < 1.0)
     return astray
 
 
@@ -477,10 +515,10 @@ def _integrate_ledger(w: Any) -> Any:
 def try_step(w: Any) -> None:
     """Solve for all stages of a step of each lane, and find the norm of its local error."""
     put_start(w)
-    differentiate(w)
+    differentiate(w, w.jacobian)
     rate = 1.0 / lanes(w.h)
     for s in range(3):
-        factor(w, s, EIGENVALUES[s].real * rate, EIGENVALUES[s].imag * rate)
+        factor(w, s, w.jacobian, EIGENVALUES[s].real * rate, EIGENVALUES[s].imag * rate)
     _predict(w)
     solved = _solve_stages(w)
     for m in range(w.n):

@@ -57,9 +57,7 @@ def try_step(w: Any) -> None:
     norm, diagonal = error_norm(w, w.k[STAGES]), 1.0 / lanes(w.h) / GAMMA_OF_STAGES
     hides = (norm < 1.0) & radau_lanes.are_open(w, w.gap, diagonal, w.k[END_STAGE])
     if any_lane(hides):
-        for m in range(w.n):
-            put(w.rhs[m], lanes(w.gap[m]))
-        norm = where(hides, larger(norm, radau_lanes.norm_at_end(w, 0, diagonal)), norm)
+        norm = larger(norm, radau_lanes.norm_at_end(w, 0, diagonal, w.gap, hides))
     put(w.norm, norm)
 
 
@@ -91,8 +89,8 @@ def interpolate(w: Any, columns: int) -> None:
 def put_matrices(w: Any) -> None:
     """Factor the matrices for checks of the polynomials; the code of a step keeps its own ones."""
     put_start(w)
-    radau_lanes.differentiate(w)
-    radau_lanes.factor(w, 0, 1.0 / lanes(w.h) / GAMMA_OF_STAGES, same(0.0))
+    radau_lanes.differentiate(w, w.jacobian)
+    radau_lanes.factor(w, 0, w.jacobian, 1.0 / lanes(w.h) / GAMMA_OF_STAGES, same(0.0))
 
 
 @compiled
