@@ -135,18 +135,12 @@ class _Step:
             self._store(self.out, (1 + stage) * n, rates)
         after = self._rates(1.0, [*CHANGES[-1], 1.0], increments)
         self._store(self.out, self.end + n, self._load(self.inputs, 1, n))
-        self._store_gaps(increments[-1], open_by, list(map(b.fsub, after, before)), inverse)
+        # What the rates at the end are open by after the last increments, which were to close what they were open by
+        # before: nothing where the equations are linear.
+        per_unit, changes = b.fmul(inverse, number(1.0 / GAMMA)), map(b.fsub, after, before)
+        closed = [b.fsub(b.fmul(part, per_unit), change) for part, change in zip(increments[-1], changes, strict=True)]
+        self._store(self.out, self.weights - 1 - n, map(b.fsub, open_by, closed))
         b.ret_void()
-
-    def _store_gaps(self, last: list[Any], open_by: list[Any], changes: list[Any], inverse: Any) -> None:
-        """Store what the rates at the end are open by after the last increments, which were to close what they were
-        open by before: nothing where the equations are linear.
-
-        Given are also the changes of the rates by these increments, and the inverse of the step.
-        """
-        b, per_unit = self.builder, self.builder.fmul(inverse, number(1.0 / GAMMA))
-        closed = [b.fsub(b.fmul(increment, per_unit), change) for increment, change in zip(last, changes, strict=True)]
-        self._store(self.out, self.weights - 1 - self.n, map(b.fsub, open_by, closed))
 
     def _rates(self, node: float, factors: list[float], increments: list[list[Any]]) -> list[Any]:
         """Evaluate the rates at a fraction of the step, where these factors of the increments are the change."""

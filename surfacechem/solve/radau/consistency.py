@@ -146,22 +146,18 @@ def _is_rounding(w: Any, delta: Any) -> bool:
 
 
 @compiled
-def _is_solved(w: Any) -> bool:
-    """True if all equations hold within roundoff of their terms: corrections tell nothing then, as those of a velocity
-    beside zero, where friction has a kink.
+def _ends_in_roundoff(w: Any, delta: Any, norm: float) -> bool:
+    """True if corrections of this size that do not decrease are roundoff, or if all equations hold within roundoff of
+    their terms: corrections tell nothing then, as those of a velocity beside zero, where friction has a kink.
     """
+    if norm <= SQRT_EPS or _is_rounding(w, delta):
+        return True
     solved = w.links == 0 and _residual(w)
     if solved:
         measure_differences(w, w.trial, w.trial_dot)
         for i in range(w.n):
             solved = solved and abs(w.rhs[i]) <= rounding_of(w, i, w.trial, w.trial_dot)
     return bool(solved)
-
-
-@compiled
-def _ends_in_roundoff(w: Any, delta: Any, norm: float) -> bool:
-    """True if corrections of this size that do not decrease are roundoff, or if that is all that is open."""
-    return bool(norm <= SQRT_EPS or _is_rounding(w, delta) or _is_solved(w))
 
 
 @compiled

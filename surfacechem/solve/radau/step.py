@@ -408,18 +408,6 @@ def _factor(w: Any, h: float) -> bool:
 
 
 @compiled
-def _renew_at_end(w: Any, h: float) -> bool:
-    """Renew the matrices at the end of the step, and leave its inputs and residuals there; True if none is singular."""
-    set_stage(w, stage_count(w.member) - 1, h)
-    evaluate_jacobian(w)
-    w.jacobians += 1
-    w.jacobian_age, w.h_jacobian = CURRENT, h
-    evaluate(w, RESIDUAL, w.rhs)
-    w.residuals += 1
-    return bool(finite(w.rhs) and _factor(w, h))
-
-
-@compiled
 def _is_astray(w: Any, h: float) -> bool:
     """True if the residuals at the end of the step, through the matrices there, are an error beyond tolerance and
     roundoff.
@@ -460,14 +448,20 @@ def _estimate_at_end(w: Any, h: float, size_last: float) -> float:
 
 @compiled
 def _norm_at_end(w: Any, h: float, size_last: float, is_open: bool, hides: bool) -> float:
-    """Norm of the error as the matrices at the end of the step tell; infinite if they are singular, or if the end of
-    the step is open through them.
+    """Norm of the error as the matrices at the end of the step tell, which replace those of the step; infinite if they
+    are singular, or if the end of the step is open through them.
     """
     copy(w.error, w.columns)
     if hides:
         find_noise(w)
+    set_stage(w, stage_count(w.member) - 1, h)
+    evaluate_jacobian(w)
+    w.jacobians += 1
+    w.jacobian_age, w.h_jacobian = CURRENT, h
+    evaluate(w, RESIDUAL, w.rhs)
+    w.residuals += 1
     norm = np.inf
-    if _renew_at_end(w, h):
+    if finite(w.rhs) and _factor(w, h):
         norm = _estimate_at_end(w, h, size_last) if hides else 0.0
         if is_open and _is_astray(w, h):
             norm = np.inf
