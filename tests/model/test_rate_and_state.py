@@ -73,7 +73,10 @@ def test_friction_that_sticks_beside_it():
     others = [Coulomb(mu=0.1)]
     load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}
     trajectory = solved(scene(RateAndStateAging, Mounting(k=K, m=M), load, others=others), 40.0)
-    assert trajectory.events[:4] == ["slip forward", "stop", "slip backward", "stop"]
+    # As creep ends the pull is the limit within roundoff, so that it may stop twice within some of the clock's ticks.
+    jumps = trajectory.jumps
+    apart = [jump for jump, last in zip(jumps[1:], jumps, strict=False) if jump.t - last.t > 1e-13]
+    assert [jump.edge.name for jump in (jumps[0], *apart)][:4] == ["slip forward", "stop", "slip backward", "stop"]
     without = solved(scene(RateAndStateAging, Mounting(k=K), load, others=others), 40.0)
     np.testing.assert_allclose(trajectory["u_t"], without["u_t"], rtol=0, atol=1e-7)
 
