@@ -134,6 +134,19 @@ def _row_sizes(w: Any, sizes: Any) -> None:
 
 
 @compiled
+def _take_jacobian(w: Any) -> bool:
+    """Prepare the Jacobian for factorizations; True if it is finite."""
+    for part in range(2):
+        for i in range(w.core):
+            if not finite(w.jacobian[part, i]):
+                return False
+    if w.core >= LARGE_MATRIX:
+        count_entries_of_rows(w.jacobian, w.entries[4])
+    # Chains that are not finite are found by their pivots.
+    return True
+
+
+@compiled
 def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
     """Evaluate G_y and G_ydot in mid-step if the predictor is good enough there, otherwise at the start; True if
     finite.
@@ -153,14 +166,16 @@ def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
         if stiffer:
             # A step from a wrong prediction must not count as converged.
             _differentiate_at_start(w)
-    for part in range(2):
-        for i in range(w.core):
-            if not finite(w.jacobian[part, i]):
-                return False
-    if w.core >= LARGE_MATRIX:
-        count_entries_of_rows(w.jacobian, w.entries[4])
-    # Chains that are not finite are found by their pivots.
-    return True
+    return _take_jacobian(w)
+
+
+@compiled
+def differentiate_at_end(w: Any, h: float) -> bool:
+    """Evaluate G_y and G_ydot at the end of the step, and leave its inputs there; True if finite."""
+    set_stage(w, stage_count(w.member) - 1, h)
+    evaluate_jacobian(w)
+    w.jacobians += 1
+    return _take_jacobian(w)
 
 
 @compiled
@@ -307,15 +322,15 @@ def _correct(w: Any) -> float:
 
 
 @compiled
-def _may_be_astray(w: Any, stages: int, h: float, norm: float) -> bool:
+def _may_be_astray(w: Any, h: float) -> bool:
     """True if Newton's method may end at a wrong state, because equations have become much softer than its matrix: its
-    last corrections, of this norm, are small and close no gap.
+    last corrections are small and close no gap.
 
     What the equations at the end of the step were open by before the last correction is in ``columns``.
     """
     if not _may_be_open(w, h, w.columns):
         return False
-    set_stage(w, stages - 1, h)
+    set_stage(w, stage_count(w.member) - 1, h)
     evaluate(w, RESIDUAL, w.rhs)
     w.residuals += 1
     return bool(_may_be_open(w, h, w.rhs))
@@ -380,4 +395,4 @@ def solve_stages(w: Any, h: float) -> int:
         w.guess_error = 0.0
         if not correction_is_noise(w, s):
             return DIVERGED
-    return OPEN if _may_be_astray(w, s, h, norm) else CONVERGED
+    return OPEN if _may_be_astray(w, h) else CONVERGED

@@ -40,6 +40,7 @@ from surfacechem.solve.radau.newton import (
     NOT_FINITE,
     OPEN,
     SHORTENED,
+    differentiate_at_end,
     differentiate_system,
     divide,
     end_of_step,
@@ -60,7 +61,6 @@ from surfacechem.solve.radau.work import (
     compiled,
     copy,
     evaluate,
-    evaluate_jacobian,
     finite,
     put,
     row_of,
@@ -454,14 +454,12 @@ def _norm_at_end(w: Any, h: float, size_last: float, is_open: bool, hides: bool)
     copy(w.error, w.columns)
     if hides:
         find_noise(w)
-    set_stage(w, stage_count(w.member) - 1, h)
-    evaluate_jacobian(w)
-    w.jacobians += 1
+    regular = differentiate_at_end(w, h)
     w.jacobian_age, w.h_jacobian = CURRENT, h
     evaluate(w, RESIDUAL, w.rhs)
     w.residuals += 1
     norm = np.inf
-    if finite(w.rhs) and _factor(w, h):
+    if regular and finite(w.rhs) and _factor(w, h):
         norm = _estimate_at_end(w, h, size_last) if hides else 0.0
         if is_open and _is_astray(w, h):
             norm = np.inf
