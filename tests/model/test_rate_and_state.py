@@ -73,7 +73,7 @@ def test_friction_that_sticks_beside_it():
     others = [Coulomb(mu=0.1)]
     load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}
     trajectory = solved(scene(RateAndStateAging, Mounting(k=K, m=M), load, others=others), 40.0)
-    # As creep ends the pull is the limit within roundoff, so that it may stop twice within some of the clock's ticks.
+    # As creep ends the velocity passes zero within its tolerance, the pull still above the limit, and may do so twice.
     jumps = trajectory.jumps
     apart = [jump for jump, last in zip(jumps[1:], jumps, strict=False) if jump.t - last.t > 1e-13]
     assert [jump.edge.name for jump in (jumps[0], *apart)][:4] == ["slip forward", "stop", "slip backward", "stop"]
