@@ -332,7 +332,7 @@ class EmbeddedScene:
     def soonest_change(self, t: float, x: Array, rtol: float) -> float:
         """Return the time [s] in which a state changes by a relative tolerance, at the present rates."""
         rates = self.many_rates(np.array([t]), x[None], self.evaluation.parameters)[0, : len(self.states)]
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             return float(np.nanmin(rtol * self._sizes(x) / np.abs(rates), initial=np.inf))
 
     def combined(self, t: float, x: Array, given: Sequence[int]) -> Array:

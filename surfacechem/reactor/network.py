@@ -17,7 +17,7 @@ from surfacechem.reactor.coupling import HeatWall
 from surfacechem.reactor.embedded import ASSUMED_LENGTH
 from surfacechem.reactor.interface_reactor import InterfaceReactor
 from surfacechem.reactor.watch import LATER_AHEAD, StepWatcher
-from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_step
+from surfacechem.solve.adapters.cantera_network import Derivatives, StateVectorReactor, last_step
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing
 from surfacechem.solve.contract import Array, Counters, Guard
 
@@ -206,6 +206,8 @@ class ReactorNet(cantera.ReactorNet):
             self._watch.restart()
             for interface in self.interfaces:
                 interface.restarted = self.time
+            for interface in self.interfaces[:1]:
+                interface.derivatives = Derivatives(self.time)
             self._started = self.time
 
     def step(self) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from surfacechem import load
 from surfacechem.errors import InputError
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import InterfaceReactor, ReactingGas, ReactingGasAtPressure, ReactingSolid, ReactorNet
@@ -187,6 +188,49 @@ def test_a_particle_and_its_electrolyte_at_a_held_potential():
     known = solve_ivp(rates, (0, 40), start, method="LSODA", rtol=1e-9, atol=1e-12).y[:, -1]
     np.testing.assert_allclose(np.concatenate((anode.x, electrolyte.x)), known, atol=1e-7)
     assert anode.x[0] > 0.7
+
+
+BRIEF = """
+units: {quantity: kmol, energy: J}
+phases:
+- {name: gas, thermo: ideal-gas, species: [A2, rest], state: {T: 660 K, P: 0.1 atm, X: {A2: 0.5, rest: 0.5}}}
+- {name: wall, thermo: ideal-surface, species: [free(s), A(s), A2(s)], kinetics: surface, reactions: all,
+   adjacent-phases: [gas], site-density: 4e-9, state: {T: 660 K, coverages: {free(s): 1}}}
+species:
+- {name: A2, composition: {H: 2}, thermo: {model: constant-cp}}
+- {name: rest, composition: {Ar: 1}, thermo: {model: constant-cp}}
+- {name: free(s), composition: {}, thermo: {model: constant-cp}}
+- {name: A(s), composition: {H: 1}, thermo: {model: constant-cp}}
+- {name: A2(s), composition: {H: 2}, sites: 2, thermo: {model: constant-cp, h0: 2.1e+8}}
+reactions:
+- {equation: A2 + 2 free(s) <=> A2(s), rate-constant: {A: 8e+16, b: 0, Ea: 0}}
+- {equation: A2 + 2 free(s) => 2 A(s), rate-constant: {A: 4e+15, b: 0, Ea: 0}}
+"""
+
+
+def test_a_state_that_lives_a_yoctosecond(tmp_path, monkeypatch):
+    """The roundoff of derivatives that the integrator took at its first steps would hide what it must correct."""
+    monkeypatch.chdir(tmp_path)
+    Path("wall.yaml").write_text(BRIEF, encoding="utf-8")
+    case = (
+        HELD.replace("1000", "660").replace("sofc", "wall").replace("metal_surface", "wall").replace("(m)", "free(s)")
+    )
+    case = case.replace(
+        "1 atm, composition: {H2: 0.5, O2: 0.1}, rest: H2O", "0.1 atm, composition: {A2: 0.5}, rest: rest"
+    )
+    case = case.replace("until: 1 s", "until: 1.4e-7 s, rtol: 1e-8")
+    gas = ReactingGas(ct.Solution("wall.yaml", "gas"), clone=True, volume=1.0, energy="off")
+    interface = InterfaceReactor(case, neighbours={"gas": gas}, area=AREA)
+    net = ReactorNet([gas, interface])
+    net.rtol, net.atol = 1e-8, 1e-15
+    net.advance(1.4e-7)
+    alone = load(case).run()
+    assert max(alone.audit.site_error, alone.audit.energy_error) < 1e-12
+    coverages = [interface[name] for name in interface.scene.states]
+    assert sum(coverages) == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(
+        coverages, [float(alone.dataset[name][-1]) for name in interface.scene.states], rtol=1e-6
+    )
 
 
 def graphite(x=0.5, **options):

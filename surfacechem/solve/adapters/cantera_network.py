@@ -28,6 +28,10 @@ LEDGER_UNIT = 1e100
 LONGEST_STEP = 0.1
 """Longest step, as a part of the arc: Cantera cannot be made to end a step at an event."""
 
+LONGER = 1000.0
+"""How much longer steps may become until derivatives are due anew: as many times as CVODES's increments of variables
+exceed those at which its derivatives, times the step at which it takes them, are roundoff."""
+
 FACTORIALS = np.cumprod(np.maximum(np.arange(13.0), 1.0))
 """Factorials up to the highest order of CVODES."""
 
@@ -93,6 +97,32 @@ class BackOffError(Exception):
     """Rates do not exist here, but a shorter step may end where they do."""
 
 
+class Derivatives:
+    """Makes CVODES take its derivatives anew as its steps become longer.
+
+    It keeps them for up to fifty steps, of which each may be ten times as long as the last. At a first step as short as
+    the fastest reaction, their roundoff is small beside the inverse of that step, but not of later ones: it would hold
+    back what Newton's method corrects, which then seems to have converged. After a failure they are taken anew.
+    """
+
+    def __init__(self, t: float) -> None:
+        self.begun = self.tried = t
+        """Start and end [s] of the step that is tried."""
+        self.shortest = np.inf
+        """The shortest step since they were due [s]."""
+
+    def check(self, t: float) -> None:
+        """Raise BackOffError at the end [s] of a step for which they are due."""
+        if t > self.tried:
+            self.begun = self.tried  # shorter steps are tried only from the same start
+        self.tried, step = t, t - self.begun
+        due = step > LONGER * self.shortest
+        if step > 0:
+            self.shortest = step if due else min(self.shortest, step)
+        if due:
+            raise BackOffError("derivatives are due")
+
+
 def _switch(name: str) -> property:
     """Return a read-only switch of Cantera's reactors, for settings that would have no effect."""
 
@@ -130,6 +160,8 @@ class StateVectorReactor(cantera.ExtensibleReactor):
     """Fixed switches of Cantera's reactors: whether they are on, and the alternative to them, in words."""
     asked: float = 0.0
     """Time of the last evaluation [s]: after a step of the integrator, its end."""
+    derivatives: Derivatives | None = None
+    """Those of the integrator, if this reactor lets them be taken anew: one does so for all of its network."""
 
     def __new__(cls, surface: Any, *_: Any, name: str = "(none)") -> Self:
         """Keep the given surface: Cantera would take a clone without the Python attributes."""
@@ -192,6 +224,8 @@ class StateVectorReactor(cantera.ExtensibleReactor):
     @hook
     def replace_eval(self, t: float, _lhs: Any, rhs: Any) -> None:  # its left side is one
         self.asked = t
+        if self.derivatives is not None:
+            self.derivatives.check(t)
         np.asarray(rhs)[:] = self.attempt(self.rates, t)
 
     @hook
@@ -214,8 +248,9 @@ class _SystemReactor(StateVectorReactor):
     integrator itself sums the ledger.
     """
 
-    def __init__(self, surface: Any, view: View, x: Array) -> None:
+    def __init__(self, surface: Any, view: View, t: float, x: Array) -> None:
         super().__init__(surface)
+        self._due = Derivatives(t).check
         lines = view.program.n_ledger if view.program.external else 0
         unit = np.concatenate((np.maximum(view.atol, TINY), np.full(lines, LEDGER_UNIT)))
         self.tolerance = float(unit[0]) if np.all(unit == unit[0]) else 1.0
@@ -242,6 +277,7 @@ class _SystemReactor(StateVectorReactor):
     def replace_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
         if self.error is not None:
             raise self._failure(self.error)
+        self._due(t)
         if self.scaled is not self._x:
             np.multiply(self.scaled, self.unit, self._x)
         try:
@@ -269,7 +305,7 @@ class _Stretch(Method):
     together = MOST_TOGETHER
 
     def __init__(self, view: View, t: float, end: float, y: Array) -> None:
-        self.view, self.reactor = view, _SystemReactor(_nothing(), view, y[view.differential])
+        self.view, self.reactor = view, _SystemReactor(_nothing(), view, t, y[view.differential])
         self.net = cantera.ReactorNet([self.reactor])
         self.net.rtol, self.net.atol = view.problem.rtol, self.reactor.tolerance
         self.net.initial_time = t
