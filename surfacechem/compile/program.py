@@ -133,7 +133,7 @@ class Lanes:
 
         assert self.states is not None
         assert self.slopes is not None
-        return compile_step(self.states, self.slopes, self.nonzeros)
+        return compile_step(self.states, self.nonzeros)
 
 
 class Chain(NamedTuple):

@@ -43,32 +43,32 @@ _FUNCTION = ir.FunctionType(ir.VoidType(), [ir.IntType(8).as_pointer()] * 3)
 
 
 @PREPARATION
-def compile_step(states: LaneFunction, slopes: LaneFunction, nonzeros: Collection[int]) -> LaneFunction:
-    """Compile a step from the code of the rates and of their derivatives by n states and by time.
+def compile_step(states: LaneFunction, nonzeros: Collection[int]) -> LaneFunction:
+    """Compile a step from the code of the rates.
 
-    ``nonzeros`` are the positions of the derivatives that may be nonzero.
+    ``nonzeros`` are the positions of those derivatives of the rates, by n states and last by time, that may be nonzero.
     Inputs are those of the rates, with the step [s] in row 1 + n. Results are, in rows of n vectors, the rates at the
     start (given), the increments of the stages (the last one is the error), the rates and states at the end, the
-    derivatives, and what the rates at the end are open by; then a flag of a doubtful step, and the weights of the
-    states (given).
+    derivatives at the start (given), and what the rates at the end are open by; then a flag of a doubtful step, and the
+    weights of the states (given).
     """
-    step = _Step(states, slopes, nonzeros)
+    step = _Step(states, nonzeros)
     step.generate()
     held = engine(object_code(step.builder))
-    return LaneFunction(int(held.get_function_address("f")), step.weights, (held, states, slopes))
+    return LaneFunction(int(held.get_function_address("f")), step.weights, (held, states))
 
 
 class _Step:
     """The code of a step."""
 
-    def __init__(self, states: LaneFunction, slopes: LaneFunction, nonzeros: Collection[int]) -> None:
-        self.states, self.slopes, self.nonzeros, self.n = states, slopes, nonzeros, states.n_out
+    def __init__(self, states: LaneFunction, nonzeros: Collection[int]) -> None:
+        self.states, self.nonzeros, self.n = states, nonzeros, states.n_out
         self.builder = function_body()
         self.out, self.inputs, self.user = self.builder.function.args
         *self.start, self.h = self._load(self.inputs, 0, 2 + self.n)
         self.end = (1 + STAGES) * self.n
         self.derivatives = self.end + 2 * self.n
-        self.weights = self.derivatives + slopes.n_out + self.n + 1
+        self.weights = self.derivatives + (self.n + 2) * self.n + 1
         self.units = self._load(self.out, self.weights, self.n)
         self.terms: list[Any] = []
         """Sizes of the terms that each pivot is the sum of."""
@@ -85,13 +85,6 @@ class _Step:
     def _store(self, base: Any, row: int, values: Iterable[Any]) -> None:
         for m, value in enumerate(values):
             self.builder.store(value, entry(self.builder, base, row + m), align=8)
-
-    def _call(self, function: LaneFunction, row: int) -> list[Any]:
-        """Call a function at the current inputs; return its results, which are stored from this row on."""
-        code = self.builder.inttoptr(ir.IntType(64)(function.address), _FUNCTION.as_pointer())
-        results = self.builder.bitcast(entry(self.builder, self.out, row), self.out.type)
-        self.builder.call(code, [results, self.inputs, self.user])
-        return self._load(self.out, row, function.n_out)
 
     def _sum(self, total: Any, factors: Iterable[float], values: Iterable[Any]) -> Any:
         for factor, value in zip(factors, values, strict=False):
@@ -115,7 +108,7 @@ class _Step:
     def generate(self) -> None:
         """Generate the code."""
         b, n = self.builder, self.n
-        slopes = self._call(self.slopes, self.derivatives)
+        slopes = self._load(self.out, self.derivatives, n * n + n)
         inverse = b.fdiv(number(1.0), self.h)
         self._factor(b.fmul(inverse, number(1.0 / GAMMA)), slopes)
         increments: list[list[Any]] = []
@@ -147,7 +140,10 @@ class _Step:
         t, *y = self.start
         there = [self._sum(y[m], factors, [each[m] for each in increments]) for m in range(self.n)]
         self._store(self.inputs, 0, [self._sum(t, [node], [self.h]), *there])
-        return self._call(self.states, self.end)
+        code = self.builder.inttoptr(ir.IntType(64)(self.states.address), _FUNCTION.as_pointer())
+        results = self.builder.bitcast(entry(self.builder, self.out, self.end), self.out.type)
+        self.builder.call(code, [results, self.inputs, self.user])
+        return self._load(self.out, self.end, self.n)
 
     # -- the matrix -------------------------------------------------------------------------------------------------
 

@@ -29,6 +29,7 @@ def stepped(code, t, y, h, parameters=(), weights=1e-6):
     inputs = np.concatenate([given, code.constants(given)])
     out = np.zeros((total + n, LANES))
     out[:n], out[total:] = code.states(inputs), weights
+    out[total - 1 - n * (n + 2) : total - 1 - n] = code.slopes(inputs)
     inputs[1 + n] = h
     call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(code.step.address)
     call(out.ctypes.data, inputs.ctypes.data, None)

@@ -47,9 +47,9 @@ the last, they reach the shortest steps that matter.
 """
 CONSTANTS = RATES + 1
 """Row of the constants in the table of addresses."""
-FREE_LANES = 4
-"""Number of free lanes at which new runs begin: a choice. A smaller one fills the lanes better, a larger one shares the
-cost of starts and ends among more runs.
+FREE_LANES = 2
+"""Number of free lanes at which new runs begin, which divides the number of lanes: a choice. A smaller one fills the
+lanes better, a larger one shares the cost of starts and ends among more runs.
 """
 
 
@@ -165,6 +165,7 @@ def _start(w: Any) -> None:
     put_where(fresh, w.proposed, _first_sizes(w))
     put_where(fresh, w.aim, np.inf)
     put_where(fresh, w.h_last, 0.0)
+    put_where(fresh, w.known, 0.0)
     for lane in range(LANES):
         i = w.run[lane]
         if w.fresh[lane] < 0.5:

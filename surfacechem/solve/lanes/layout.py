@@ -50,6 +50,8 @@ MEMORY = {
     **_arrays("value slope longest nudge"),
     # evaluations of the equations
     **_arrays("evaluations"),
+    # flags: whether the derivatives of the rates at the start of the step are known, and those at its end
+    **_arrays("known known_at_end"),
     # flags: a start or restart; the first step of a segment, the last one; a step onto a guard; one that is repeated;
     # one that is stiff; guards of which it is unclear whether they are met; a step that is taken; parameters that are
     # inside, too
@@ -81,8 +83,8 @@ RADAU_MEMORY = {
     # imaginary part of the real one; coefficients of the predictor
     **_arrays("z g parts predictor", 5, "n"),
     **_arrays("imaginary error rhs", "n"),
-    # derivatives of the rates, in units of the weights; those by time, which the code writes too; Newton matrices
-    # (system, real and imaginary part), overwritten by their factors, with flags of the rows that are exchanged
+    # derivatives of the rates at the start; those by time, which the code writes too; Newton matrices (system, real and
+    # imaginary part), overwritten by their factors, with flags of the rows that are exchanged
     **_arrays("jacobian", "n", "n"),
     **_arrays("time_slopes", "n"),
     **_END_SLOPES,
@@ -94,9 +96,9 @@ RADAU_MEMORY = {
 """Arrays of the loop with steps of Radau IIA."""
 
 ROSENBROCK_MEMORY = {
-    # rates at the start, increments of the stages, rates and states at the end, as the code of the step writes them; it
-    # continues with the derivatives of the rates, what those at the end are open by and a flag of doubtful factors, and
-    # reads the weights
+    # rates at the start, increments of the stages, rates and states at the end, as the code of the step has them; it
+    # continues with the derivatives at the start, what the rates at the end are open by and a flag of doubtful
+    # factors, and reads the weights
     **_arrays("k", 11, "columns"),
     **_arrays("jacobian", "n", "n"),
     **_arrays("time_slopes gap", "n"),

@@ -94,13 +94,36 @@ _defect_at_start = weighted_sums(np.array([[1.0, *-tables.START_RATE[MEMBER, :ST
 
 
 @compiled
-def differentiate(w: Any, jacobian: Any) -> None:
-    """Evaluate the derivatives of the rates at the inputs, in units of the weights."""
-    evaluate(w, JACOBIAN, jacobian)
+def _put_derivatives(w: Any, chosen: Any) -> None:
+    """Set the derivatives of the rates at the start of the step from those at the end, in the lanes of a mask."""
     for i in range(w.n):
-        unit = 1.0 / lanes(w.weight[i])
         for j in range(w.n):
-            put(jacobian[i, j], lanes(jacobian[i, j]) * (lanes(w.weight[j]) * unit))
+            put_where(chosen, w.jacobian[i, j], lanes(w.end_jacobian[i, j]))
+        put_where(chosen, w.time_slopes[i], lanes(w.end_time_slopes[i]))
+
+
+@compiled
+def differentiate(w: Any) -> None:
+    """Set the inputs to the start of the step, and evaluate the derivatives of the rates there where the step before
+    has left none.
+    """
+    put_start(w)
+    new = lanes(w.known) < 0.5
+    if any_lane(new):
+        evaluate(w, JACOBIAN, w.end_jacobian)
+        _put_derivatives(w, new)
+    put(w.known, 1.0)
+    put(w.known_at_end, 0.0)
+
+
+@compiled
+def keep_derivatives(w: Any) -> None:
+    """Keep the derivatives at the end of the steps that are taken, if they have been evaluated."""
+    taken = lanes(w.taken) > 0.5
+    ends = taken & (lanes(w.known_at_end) > 0.5)
+    if any_lane(ends):
+        _put_derivatives(w, ends)
+    put_where(taken, w.known, lanes(w.known_at_end))
 
 
 @compiled
@@ -126,8 +149,9 @@ def factor(w: Any, s: int, jacobian: Any, real: Any, imaginary: Any) -> None:
     """
     n, re, im = w.n, w.matrix[s, 0], w.matrix[s, 1]
     for i in range(n):
+        unit = 1.0 / lanes(w.weight[i])
         for j in range(n):
-            put(re[i, j], 0.0 - lanes(jacobian[i, j]))
+            put(re[i, j], 0.0 - lanes(jacobian[i, j]) * (lanes(w.weight[j]) * unit))
             put(im[i, j], 0.0)
         put(re[i, i], real - lanes(jacobian[i, i]))
         put(im[i, i], imaginary)
@@ -318,16 +342,17 @@ def _norm_by_diagonal(w: Any, diagonal: Any, gap: Any) -> Any:
     """
     first, second = same(0.0), same(0.0)
     for i in range(w.n):
-        pivot = absolute(diagonal - lanes(w.end_jacobian[i, i]))
-        size = absolute(lanes(gap[i])) / (lanes(w.weight[i]) * pivot)
-        put(w.rhs[i], size)
+        unit = 1.0 / (lanes(w.weight[i]) * absolute(diagonal - lanes(w.end_jacobian[i, i])))
+        size = absolute(lanes(gap[i])) * unit
+        put(w.imaginary[i], unit)
+        put(w.rhs[i], size * lanes(w.weight[i]))
         first = where(size <= first, first, size)  # not larger(): NaN must be seen
     for i in range(w.n):
         total = same(0.0)
         for j in range(w.n):
             if j != i:
                 total = total + absolute(lanes(w.end_jacobian[i, j])) * lanes(w.rhs[j])
-        size = total / absolute(diagonal - lanes(w.end_jacobian[i, i]))
+        size = total * lanes(w.imaginary[i])
         second = where(size <= second, second, size)
     return where(second <= 0.5 * first, 2.0 * first, np.inf)
 
@@ -339,7 +364,8 @@ def norm_at_end(w: Any, s: int, diagonal: Any, gap: Any, hides: Any) -> Any:
 
     Equations may have become much softer than the matrix of the step. What may be roundoff does not count.
     """
-    differentiate(w, w.end_jacobian)
+    evaluate(w, JACOBIAN, w.end_jacobian)
+    put(w.known_at_end, 1.0)
     norm = where(hides, _norm_by_diagonal(w, diagonal, gap), 0.0)
     hides = ~(norm < 1.0)
     if any_lane(hides):
@@ -514,8 +540,7 @@ def _integrate_ledger(w: Any) -> Any:
 @compiled
 def try_step(w: Any) -> None:
     """Solve for all stages of a step of each lane, and find the norm of its local error."""
-    put_start(w)
-    differentiate(w, w.jacobian)
+    differentiate(w)
     rate = 1.0 / lanes(w.h)
     for s in range(3):
         factor(w, s, w.jacobian, EIGENVALUES[s].real * rate, EIGENVALUES[s].imag * rate)
@@ -637,6 +662,7 @@ def check_outputs(w: Any) -> None:
 @compiled
 def keep_step(w: Any) -> None:
     """Keep the slopes at the stages of the steps that are taken, from which the next ones are predicted."""
+    keep_derivatives(w)
     taken = lanes(w.taken) > 0.5
     for i in range(STAGES):
         for m in range(w.n):

@@ -16,7 +16,7 @@ from surfacechem.compile.rosenbrock import GAMMA as GAMMA_OF_STAGES
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes import radau_lanes
 from surfacechem.solve.lanes.lane_run import CONSTANTS, loop_of
-from surfacechem.solve.lanes.lane_step import error_norm, larger, nothing, put_moved, put_start
+from surfacechem.solve.lanes.lane_step import error_norm, larger, nothing, put_moved
 from surfacechem.solve.lanes.layout import ORDER, ROSENBROCK_MEMORY
 from surfacechem.solve.lanes.vector import any_lane, lanes, put, same, where
 from surfacechem.solve.radau.work import compiled, evaluate, weighted_sums
@@ -48,7 +48,7 @@ _quarters = weighted_sums([[x**d for d in range(1, 1 + ORDER)] @ _POLYNOMIALS fo
 @compiled
 def try_step(w: Any) -> None:
     """Take a step of each lane, and set the norm of its local error."""
-    put_start(w)
+    radau_lanes.differentiate(w)
     put(w.inputs[1 + w.n], lanes(w.h))
     evaluate(w, STEP, w.k)
     put(w.evaluations, lanes(w.evaluations) + float(STAGES))
@@ -88,8 +88,6 @@ def interpolate(w: Any, columns: int) -> None:
 @compiled
 def put_matrices(w: Any) -> None:
     """Factor the matrices for checks of the polynomials; the code of a step keeps its own ones."""
-    put_start(w)
-    radau_lanes.differentiate(w, w.jacobian)
     radau_lanes.factor(w, 0, w.jacobian, 1.0 / lanes(w.h) / GAMMA_OF_STAGES, same(0.0))
 
 
@@ -107,6 +105,7 @@ run_linearly = loop_of(
     "RosenbrockLanes", END_STAGE, POWER, ROSENBROCK_MEMORY,
     root_of=radau_lanes.root_of, try_step=try_step, limit_size=radau_lanes.limit_growth, find_noise=nothing,
     find_stiff=find_doubtful, put_roughly=put_roughly, interpolate=interpolate, put_matrices=put_matrices,
-    find_defects=find_defects, check_outputs=radau_lanes.check_outputs, keep_step=nothing,
+    find_defects=find_defects, check_outputs=radau_lanes.check_outputs,
+    keep_step=radau_lanes.keep_derivatives,
 )  # fmt: skip
 """Solve the runs of a batch."""
