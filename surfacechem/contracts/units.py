@@ -244,8 +244,9 @@ def _number(value: object, unit: str, name: str, difference: bool) -> float:
     if _NOT_FINITE.fullmatch(text):
         raise InputError(f"{name} must be finite, got {text}.")
     found = QUANTITY.fullmatch(text) if len(text) <= _MOST_CHARACTERS else None
-    if found is None:
-        raise InputError(f"{_short(text)} is not a number with a unit; {name} needs {dimension(unit)}.")
+    if found is None or found[2][:1] in ("-", "+", ","):  # as of 280-340 K or 0,5 mm
+        point = " Decimals follow a point." if found and found[2][0] == "," else ""
+        raise InputError(f"{_short(text)} is not a number with a unit; {name} needs {dimension(unit)}.{point}")
     return _converted(found[1], found[2], unit, name, difference) if found[2] else float(found[1])
 
 

@@ -248,6 +248,7 @@ class _Builder:
         from ruamel.yaml import YAML
         from ruamel.yaml.error import MarkedYAMLError
         from ruamel.yaml.reader import ReaderError
+        from ruamel.yaml.scanner import ScannerError
 
         try:
             yield from YAML(typ="safe", pure=True).parse(StringIO(text))
@@ -255,7 +256,9 @@ class _Builder:
             line = text.count("\n", 0, error.position) + 1
             raise InputError("a control character, which YAML does not allow.", Place(self.file, line)) from None
         except MarkedYAMLError as error:
-            mark = error.problem_mark or error.context_mark
+            # What the scanner misses it misses later: of a `key:value` without a space in the next line.
+            begun = error.context_mark if isinstance(error, ScannerError) else None
+            mark = begun or error.problem_mark or error.context_mark
             message = " ".join(", ".join(part for part in (error.context, error.problem) if part).split())
             place = Place(self.file, mark.line + 1 if mark else 0)
             raise InputError(f"not YAML: {message.rstrip('.')}.", place) from None

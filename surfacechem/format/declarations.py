@@ -27,7 +27,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from surfacechem import laws
 from surfacechem.contracts.terms import Factor, Law, Load, Spec, Varying, resolved_unit
-from surfacechem.contracts.units import TOTAL_UNITS, ZERO_CELSIUS, quotient
+from surfacechem.contracts.units import TOTAL_UNITS, ZERO_CELSIUS, dimension, quotient
 from surfacechem.contracts.units import parse as si
 from surfacechem.documents.document import OVERRIDE, Tree
 from surfacechem.errors import InputError, Place, placed
@@ -118,11 +118,13 @@ class Number(Content):
         spec = self.spec.resolved(context.x)
         if context.whole:
             spec = spec._replace(unit=TOTAL_UNITS.get(spec.unit, spec.unit))
-        if not (isinstance(tree.value, dict) and "value" in tree.value):
+        if not isinstance(tree.value, dict) or not (spec.varies or "value" in tree.value):
             return number(tree, spec, name, context, difference=self.difference)
         if not spec.varies:
             raise tree.error(f"{name} cannot vary; give it a value.")
         parts = tree.mapping(["value", "times"])
+        if "value" not in parts:
+            raise tree.error(f"{name} needs `value`: {dimension(spec.unit)}.")
         value = number(parts["value"], spec, name, context)
         factors = ListOf(OneLaw(Factor)).read(parts["times"], "times", context) if "times" in parts else None
         return value if factors is None else Varying(value, factors)

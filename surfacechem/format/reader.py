@@ -15,7 +15,7 @@ from surfacechem import solve as solvers
 from surfacechem.contracts.terms import Law, Load, Property
 from surfacechem.contracts.units import TOTAL_UNITS
 from surfacechem.documents.document import Tree
-from surfacechem.errors import InputError, Place, refuse_unknown
+from surfacechem.errors import InputError, Place, listed, refuse_unknown
 from surfacechem.format.declarations import UNITS, Context, is_name, keys, number, read
 from surfacechem.format.sections import (
     BODY_NAME,
@@ -117,7 +117,10 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
 def _refuse(top: Mapping[str, Tree], bodies: Mapping[str, Tree], interface: Mapping[str, Tree]) -> None:
     """Raise InputError if bodies are not two, or cannot have their names, or curved ones bond or rub as flats do."""
     if "bodies" in top and len(bodies) != 2:
-        raise top["bodies"].error(f"exactly two bodies are needed, not {len(bodies)}; the first is body 1.")
+        message = (
+            f"exactly two bodies are needed, not {len(bodies)} ({listed([*bodies]) or 'none'}); the first is body 1."
+        )
+        raise top["bodies"].error(message)
     for name, body in bodies.items():
         if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
             raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")

@@ -190,9 +190,9 @@ def find(name: str, folder: Path, place: Place) -> Path:
     for other in folders:
         if (path := document.file_in(other, name, place)) is not None:
             return path
-    files = ((file, other) for other in (data.mechanisms(), *folders) for file in other.glob("*.yaml"))
+    files = ((file, other) for other in (folder, data.mechanisms(), *folders) for file in other.glob("*.yaml"))
     examples = ((file, other) for other in folders for file in other.glob("*/*.yaml"))
-    known = [file.relative_to(other).as_posix() for file, other in (*files, *examples)]
+    known = {file.relative_to(other).as_posix() for file, other in (*files, *examples)}
     message = f"no mechanism file {name}.{suggestion(Path(name).name, known)}"
     raise InputError(message, place if place.line or place.path else None)
 

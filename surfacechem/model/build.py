@@ -432,7 +432,7 @@ class Build:
             rounding = sum((absolute(term) for term in whole.args), symengine.Integer(0)) if whole.is_Add else 0
             slack = NO_AMOUNT + RUN_EPS * rounding + RUN_EPS * absolute(least)
             reason = f"{name} fell below {least if least != 0 else 'zero'}, {ends}"
-            self.margins.append(Margin(f"{name} >= {least}", value - least + slack, reason))
+            self.margins.append(Margin(f"{name} >= {least}", value - least + slack, reason, path=law.path))
         self._narrow_places(law, own, met)
         self._limit_margins(law)
 
@@ -449,7 +449,7 @@ class Build:
             reason = f"{name} left the range of {law.called}, {' to '.join(told)}"
             for side, end, text in given:
                 inside = value - end + slack if side == ">=" else end + slack - value
-                self.margins.append(Margin(f"{name} {side} {text}", inside, reason, domain=True))
+                self.margins.append(Margin(f"{name} {side} {text}", inside, reason, path=law.path, domain=True))
 
     def _read(self, law: Law, name: str, own: Mapping[str, Expression]) -> Expression:
         """Return the expression that a law reads by a name: from its own arguments, else from the scene."""

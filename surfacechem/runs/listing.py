@@ -183,7 +183,8 @@ def law_page(name: str) -> str:
         return law_table(asked[0])
     every = [(contract, law) for contract in FAMILIES for law in laws(contract).values()]
     found = [(contract, law) for contract, law in every if law.name() == name]
-    refuse_unknown([name], {law.name() for _, law in every}, "no law '{}'", listed_by=LAWS)
+    names = {contract.contract for contract in FAMILIES} | {law.name() for _, law in every}
+    refuse_unknown([name], names, "no law '{}'", listed_by=LAWS)
 
     def apart(formula: re.Match[str]) -> str:
         """Indent formulas, each on its own line if they are too long for one."""

@@ -151,6 +151,7 @@ class TestRun:
         (["sweep", "bonding.yaml", *["--over", "initial.T=[300]"] * 2], "initial.T: it is given twice."),
         (["equations", "bonding.yaml", "--format", "pyton"], "Did you mean 'python'?"),
         (["laws", "colomb"], "Did you mean 'coulomb'?"),
+        (["laws", "friktion"], "Did you mean 'friction'?"),
         (["plot", "nothing.nc"], "there is no file nothing.nc."),
         (["plot", "bonding.yaml", "-o", "x.gif"], "no format 'gif'"),
         (["plot", "bonding.yaml", "-o", "no/x.png"], "no/x.png: cannot be written"),

@@ -88,6 +88,13 @@ def test_an_initial_state_that_no_law_allows():
     assert str(case.located(error.value)).startswith("case.yaml:5: interface: at the start the heat capacity at T was")
 
 
+def test_a_start_beyond_the_end_of_a_law():
+    with pytest.raises(
+        InputError, match=r"sliding-dry\.yaml:\d+: interface\.friction\.coulomb: at the start p fell below"
+    ):
+        surfacechem.run("sliding-dry", {"loading.p": "-1 kPa", "reference": ""})
+
+
 def test_a_start_below_the_least_temperature_tells_it():
     told = r"T > 0 does not hold: -1e-09\). Below 1e-09 K it counts as zero\.$"
     with pytest.raises(InputError, match=told):

@@ -7,6 +7,7 @@ import pytest
 from surfacechem.documents import mechanisms
 from surfacechem.errors import InputError, Place
 from surfacechem.mechanism import load_mechanism
+from surfacechem.mechanism.load import find
 
 TEXT = (mechanisms() / "dna-film.yaml").read_text(encoding="utf-8")
 
@@ -175,6 +176,9 @@ def test_errors_of_the_case_stand_in_the_case(arguments, message):
 def test_a_missing_file_names_what_there_is(tmp_path):
     with pytest.raises(InputError, match=r"no mechanism file .*\. Did you mean 'selectin.yaml'\?"):
         load_mechanism(tmp_path / "selectins.yaml")
+    (tmp_path / "glue.yaml").touch()
+    with pytest.raises(InputError, match=r"no mechanism file glu.yaml\. Did you mean 'glue.yaml'\?"):
+        find("glu.yaml", tmp_path, Place())
 
 
 @pytest.mark.parametrize(

@@ -119,9 +119,10 @@ def test_what_is_known_is_told_once_and_can_be_written(end, message, monkeypatch
 
 
 def test_events_that_a_stage_may_wait_for_are_told_once():
-    changes = ["loading.w_t=", "programme=[{pull: {w_t: 1 mm/s, until: sliip}}]"]
-    with pytest.raises(InputError, match=r"Known: slip backward, slip forward, stop\."):
-        surfacechem.load("stick-slip", changes).case.system()
+    for event in ("sliip", "slip back"):
+        changes = ["loading.w_t=", f"programme=[{{pull: {{w_t: 1 mm/s, until: {event}}}}}]"]
+        with pytest.raises(InputError, match=r"Known: slip backward, slip forward, stop\."):
+            surfacechem.load("stick-slip", changes).case.system()
 
 
 def test_rates_are_told_in_a_unit_without_brackets():

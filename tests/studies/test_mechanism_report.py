@@ -124,6 +124,10 @@ def test_the_figure_shows_every_reaction_once(call, tmp_path):
         (("sofc",), "name one: `phase` in a case, `--phase` of the command. Known: metal_surface, oxide_surface."),
         (("selectin", "--phase", "contatc"), "has no phase 'contatc'. Did you mean 'contact'?"),
         (("selectin", "-T", "360..280 K"), "--temperature: '360..280 K' is no range upwards"),
+        (
+            ("selectin", "-T", "280-360 K"),
+            "--temperature: '280-360 K' is not a number with a unit; --temperature needs a",
+        ),
         (("selectin", "-T", "0 K"), "--temperature: '0 K' is no range upwards"),
         (("selectin", "-T", "3 m"), "--temperature"),
         (("selectin", "--force", "3 K"), "--force"),

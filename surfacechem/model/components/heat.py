@@ -196,7 +196,7 @@ def end_node(build: Build, end: str, law: HeatTransfer | None = None) -> Node:
     if end == "surroundings":
         message = "the surroundings have no temperature. Add `surroundings: {temperature: ...}`."
         raise InputError(message, _ends(law))
-    known = [*build.thermal.node_of, "interface", "surroundings"]
+    known = {*build.thermal.node_of, "interface", "surroundings"}
     raise InputError(f"no end '{end}'.{suggestion(end, known)}", _ends(law))
 
 

@@ -91,7 +91,7 @@ def stages(build: Build) -> Iterator[Constraint | str]:
         """Return the new stage and its start time along an edge that stages wait for."""
         modes: dict[Expression, Expression] = {}
         for i, item in waiting:
-            if edge.name.startswith(item.event) and not edge.ends_stage:
+            if _is_awaited(item, edge.name) and not edge.ends_stage:
                 modes[STAGE] = where(_during(i), i + 1, modes.get(STAGE, STAGE))
                 modes[begun] = where(_during(i), build.t, modes.get(begun, begun))
         return modes
@@ -119,11 +119,16 @@ def _is_so_already(build: Build, i: int, guard: Expression) -> bool:
     return left >= -FEW_EPS * abs(item.value) or (i == 0 and build.at_start(guard) == 0)
 
 
+def _is_awaited(item: Stage, edge: str) -> bool:
+    """Return whether a stage waits for an edge of this name, or of one that begins with whole words: any ``slip``."""
+    return f"{edge} ".startswith(f"{item.event} ")
+
+
 def _refuse_unknown_event(build: Build, i: int, item: Stage) -> None:
     """Raise InputError unless a stage waits for an edge of the interface, or for the end of an earlier stage."""
     before = [f"end of {stage.name}" for stage in build.scene.programme[:i] if not stage.event]
     known = {*(edge.name for edge in build.edges), *before}
-    if not any(name.startswith(item.event) for name in known):
+    if not any(_is_awaited(item, name) for name in known):
         message = f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}"
         raise InputError(message, item.place)
 
