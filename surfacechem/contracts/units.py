@@ -19,14 +19,16 @@ from decimal import Decimal
 from functools import lru_cache
 from itertools import chain, repeat
 from numbers import Real
-from typing import Any, cast
+from typing import Any
+
+import numpy as np
 
 from surfacechem.errors import InputError, Place, suggestion
 
 ZERO_CELSIUS = Decimal("273.15")
 """0 degC in K."""
 
-POWER_TOWER = re.compile(r"[\d²³⁰-⁹]\s*\)*\s*(?:\^|\*\*)|(?:\^|\*\*)\s*(?![-+(\d])")
+POWER_TOWER = re.compile(r"[\d²³⁰-⁹]\s*\)*\s*(?:\^|\*\*)|(?:\^|\*\*)(?!\s*[-+(\d])")
 """Powers of powers, such as 9^9^9, whose evaluation would not end, and powers of numbers."""
 
 _FACTOR = re.compile(r"([^\W\d_]+|%|1)(?:(?:\^|\*\*)([-+]?\d+))?")
@@ -235,7 +237,7 @@ def parse(
 
 def _number(value: object, unit: str, name: str, difference: bool) -> float:
     if getattr(value, "ndim", None) == 0:  # a zero-dimensional array, as from indexing xarray
-        value = cast("Any", value).item()
+        value = listed(value)
     if isinstance(value, Real) and not isinstance(value, bool):
         return _as_float(value)
     if not isinstance(value, str):
@@ -248,6 +250,20 @@ def _number(value: object, unit: str, name: str, difference: bool) -> float:
         point = " Decimals follow a point." if found and found[2][0] == "," else ""
         raise InputError(f"{_short(text)} is not a number with a unit; {name} needs {dimension(unit)}.{point}")
     return _converted(found[1], found[2], unit, name, difference) if found[2] else float(found[1])
+
+
+def listed(array: Any) -> Any:
+    """Return the numbers of an array of NumPy, xarray or Pint; where it says its unit, as texts with that unit.
+
+    >>> listed(np.array([1.5, 2.0])), listed(np.float64(3.0))
+    ([1.5, 2.0], 3.0)
+    """
+    number = getattr(array, "magnitude", array)
+    unit = array.units if number is not array else getattr(array, "attrs", {}).get("units")
+    values = np.asarray(number).tolist()
+    if not unit:
+        return values
+    return [f"{value} {unit}" for value in values] if isinstance(values, list) else f"{values} {unit}"
 
 
 def _as_float(value: Real | Decimal) -> float:

@@ -17,8 +17,9 @@ from dataclasses import replace
 from io import StringIO
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
+from surfacechem.contracts.units import listed
 from surfacechem.errors import InputError, Place, nearest, refuse_unknown, suggestion
 
 # Largest depth of nested mappings and lists.
@@ -365,8 +366,8 @@ def join(path: str, key: str) -> str:
 
 def from_plain(value: object, place: Place) -> Tree:
     """Return a tree of plain Python data at one place, in which keys of mappings continue its path."""
-    if getattr(value, "ndim", None) == 0:  # a number, or a text, of NumPy or xarray
-        value = cast("Any", value).item()
+    if hasattr(value, "ndim"):  # an array of NumPy, xarray or Pint
+        value = listed(value)
     if isinstance(value, Mapping):
         entries = ((str(key), item) for key, item in value.items())
         return Tree({key: from_plain(item, replace(place, path=join(place.path, key))) for key, item in entries}, place)

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.contracts.units import QUANTITY, parse
+from surfacechem.contracts.units import QUANTITY, listed, parse
 from surfacechem.documents.document import OVERRIDE, Tree, parameter_path
 from surfacechem.errors import PATHS, InputError, Place, refuse_unknown
 from surfacechem.format import data_files
@@ -458,14 +458,14 @@ def split_arrays(over: Mapping[str, object]) -> tuple[dict[str, object], dict[st
     """Return the values as in a case, and separately numbers that are not read entry by entry: arrays, ranges, and
     columns of tables and datasets. One that says its unit is a list of texts with that unit.
     """
+    if not isinstance(over, Mapping):
+        raise InputError(f"`over` takes values by path, {{'initial.T': [290, 300]}}, not {over!r}.", path="sweep.over")
     lists, arrays = dict(over), {}
     for path, values in over.items():
         if isinstance(values, Collection) and not isinstance(values, str | list | tuple | Mapping):
-            array = np.asarray(values)
-            lists[path] = array.tolist()
-            if said := getattr(values, "attrs", {}).get("units"):
-                lists[path] = [f"{value} {said}" for value in array.tolist()]
-            elif array.ndim == 1 and array.dtype.kind in "iuf":
+            lists[path] = listed(values)
+            array = np.asarray(lists[path])
+            if array.ndim == 1 and array.dtype.kind in "iuf":
                 lists[path], arrays[path] = [], array.astype(float)
     return lists, arrays
 
@@ -550,6 +550,8 @@ def _axis(path: str, tree: Tree, units: Mapping[str, str], array: Array | None) 
     values = SWEPT.read(tree, path, Context(x=units[path]))
     if not isinstance(values, RangeSection):
         return Axis(path, list(values))
+    if values.points == 1 and values.first != values.last:
+        raise values.error("a range of one value has one end; give two `points`, or a list.", "points")
     logarithmic = _logarithmic(values)
     return Axis(path, EvenlySpaced(values.first, values.last, values.points, logarithmic), logarithmic)
 

@@ -168,8 +168,7 @@ class Simulation:
         Simulation
             Assembled and compiled when first needed; an InputError of the scene is raised then.
         """
-        times = run and replace(run, times=tuple(map(float, run.times)))  # times may be an array
-        return cls(Case("scene", title, "", "", scene, times, None, None, "", None, {"": Place(title)}, ""))
+        return cls(Case("scene", title, "", "", scene, run, None, None, "", None, {"": Place(title)}, ""))
 
     @cached_property
     def system(self) -> System:
@@ -612,6 +611,8 @@ class Simulation:
         units = self.units
         given = changes if isinstance(changes, Mapping) else assignments(changes)
         changes = {parameter_path(path, units): value for path, value in given.items()}
+        if len(changes) < len(given):
+            raise InputError(f"a parameter is given twice, with and without the key of its value: {', '.join(given)}.")
         unknown = next((path for path in changes if path not in units), None)
         if unknown is not None and self._is_key(unknown, changes[unknown]):
             remedy = "give it to `load`, or to `surfacechem.run`, beside the case"

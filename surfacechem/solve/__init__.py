@@ -4,7 +4,7 @@ choice of one for a problem, with the reason in words.
 >>> solver("radua")
 Traceback (most recent call last):
     ...
-ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cantera, cvode, dop853, ida, lsoda, radau, scipy-radau.
+surfacechem.errors.InputError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cantera, cvode, ...
 """
 
 import ast
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from surfacechem.compile.program import MOST_RATE_STATES, Program
-from surfacechem.errors import suggestion
+from surfacechem.errors import refuse_unknown
 from surfacechem.solve.contract import Problem, Solver
 from surfacechem.tolerances import MIN_RTOL
 
@@ -42,8 +42,7 @@ names = (*OWN, *sorted(_ADAPTERS, key=lambda name: name in CALLING_PYTHON))
 @cache
 def solver(name: str) -> Solver:
     """Return the solver of this name; the default is 'radau', a method of this package."""
-    if name not in names:
-        raise ValueError(f"no solver '{name}'.{suggestion(name, names)}")
+    refuse_unknown([name], names, "no solver '{}'")
     if name in OWN:
         made = getattr(import_module("surfacechem.solve.radau.solver"), OWN[name])()
     else:

@@ -94,8 +94,15 @@ class Run:
 
     def __post_init__(self) -> None:
         """Check the tolerances, and that output times start at zero, where the initial values hold, and increase."""
-        if len(self.times) < 2 or self.times[0] != 0 or any(map(operator.le, self.times[1:], self.times)):
-            raise InputError("output times must start at 0 and increase from each to the next, at least two.")
+        if not isinstance(self.times, tuple):  # a list or an array, which compare in other ways
+            object.__setattr__(self, "times", tuple(map(float, self.times)))
+        times = self.times
+        if len(times) < 2 or times[0] != 0 or not all(map(operator.lt, times, times[1:])) or times[-1] == np.inf:
+            raise InputError(
+                "output times must start at 0 and increase from each to the next, at least two, all finite."
+            )
+        if self.max_steps < 1:
+            raise InputError(f"max_steps must be at least 1, not {self.max_steps}.")
         if not (0 < self.rtol < 1 and 0 <= (self.atol or 0.0) < np.inf):
             raise InputError(
                 f"rtol must lie in (0, 1), and atol must be finite and not negative: {self.rtol:g}, {self.atol}."

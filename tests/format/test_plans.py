@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pint
 import pytest
 import xarray
 from scipy import stats
@@ -98,6 +99,12 @@ def test_arrays_are_the_lists_of_their_numbers(bonding):
     assert len(bonding.plan({K_0: np.linspace(1.0, 300.0, 100_000)}).record) < 200
     celsius = xarray.DataArray([17.0, 27.0], attrs={"units": "degC"})
     assert bonding.plan({"initial.T": celsius}).at(np.arange(2))["initial.T"].tolist() == [290.15, 300.15]
+    assert bonding.plan({K_0: pint.Quantity([0.1, 0.3], "kJ/m**2")}).axes[0].at(np.arange(2)).tolist() == [100.0, 300.0]
+    for one in ({"initial.T": celsius[0]}, "initial.T"):
+        with pytest.raises(InputError, match=r"sweep\.over.*(must be a list|takes values by path)"):
+            bonding.plan(one)
+    with pytest.raises(InputError, match="a range of one value has one end"):
+        bonding.plan({K_0: {"from": 1, "to": 2, "points": 1}})
     for wrong in (np.array([1.0, np.nan]), np.array([1.0, np.inf, 2.0]), np.array([]), np.ones(2), np.ones((2, 1))):
         with pytest.raises(InputError, match=K_0):
             bonding.plan({K_0: wrong})

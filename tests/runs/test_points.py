@@ -3,6 +3,7 @@
 import numpy as np
 import pandas
 import pytest
+import xarray
 from typer.testing import CliRunner
 
 import surfacechem
@@ -237,6 +238,8 @@ def test_what_cannot_be_a_point_is_refused(points, message, element):
 def test_a_table_of_points_is_one_of_pandas_too(element):
     points = {"g_n": [-1e-9, 1e-9]}
     assert element.evaluate(pandas.DataFrame(points)).identical(element.evaluate(points))
+    in_nanometres = xarray.DataArray([-1, 1], attrs={"units": "nm"})
+    assert element.evaluate({"g_n": in_nanometres}).identical(element.evaluate(points))
 
 
 @pytest.mark.parametrize("changes", [(), "run="])

@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pandas
+import pint
 import pytest
 import xarray
 from ruamel.yaml import YAML
@@ -51,6 +52,7 @@ def test_a_changed_run_can_be_run_again_from_its_file(simulation, tmp_path):
         ({"run.slack": 10.0}, r"no parameter 'run\.slack' to change"),
         ({"phi_max": 5.0}, r"no parameter 'phi_max' to change"),
         ({"initial.phi": 1.5}, r"at the start phi rose above its bound 1"),
+        ({"initial.T": 300, "initial.T.level": 310}, "a parameter is given twice, with and without the key of its"),
         (["bodies.lower.C=-1"], r"bodies\.lower\.C = -1 is outside its range: > 0"),
     ],
 )
@@ -59,10 +61,19 @@ def test_a_change_that_makes_no_sense_is_refused(simulation, changes, message):
         simulation.run(changes)
 
 
-@pytest.mark.parametrize("times", [(), (0.0,), (0.5, 1.0), (0.0, 1.0, 1.0), (0.0, 2.0, 1.0)])
+@pytest.mark.parametrize("times", [(), (0.0,), (0.5, 1.0), (0.0, 1.0, 1.0), (0.0, 2.0, 1.0), (0, np.nan), (0, np.inf)])
 def test_output_times_start_at_zero_and_increase(simulation, times):
     with pytest.raises(InputError, match="output times must start at 0 and increase"):
         dataclasses.replace(simulation.case.run, times=times)
+
+
+def test_settings_from_python_are_checked_like_those_of_a_case(simulation):
+    settings = dataclasses.replace(simulation.case.run, times=np.linspace(0, 1, 3), picture=None)
+    assert simulation.run(run=settings).dataset.time.values.tolist() == [0.0, 0.5, 1.0]
+    with pytest.raises(InputError, match="max_steps must be at least 1, not 0"):
+        simulation.run(run=dataclasses.replace(settings, max_steps=0))
+    with pytest.raises(InputError, match=r"no solver 'radua'\. Did you mean 'radau'\?"):
+        simulation.run(run=dataclasses.replace(settings, solver="radua"))
 
 
 def test_a_constant_history_is_changed_by_its_name_in_any_unit():
@@ -72,6 +83,9 @@ def test_a_constant_history_is_changed_by_its_name_in_any_unit():
     assert speeds == pytest.approx([0.05, 0.05, 0.05, 1.0], rel=1e-7)
     at_a_place = xarray.DataArray([0.05], dims="run")[0]
     assert surfacechem.load("sliding-dry", {"loading.v": at_a_place}).run().dataset["v"][0] == 0.05
+    for told in (at_a_place.assign_attrs(units="km s-1"), pint.Quantity(50, "m / s")):
+        assert sliding.run({"loading.v": told}).dataset["v"][0] == 50
+        assert surfacechem.load("sliding-dry", {"loading.v": told}).run().dataset["v"][0] == 50
 
 
 def test_a_table_has_no_numbers_to_change():
