@@ -16,7 +16,7 @@ import shutil
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -257,7 +257,7 @@ def opened(path: str | Path) -> xarray.Dataset:
     _zarr()
     try:
         found: xarray.Dataset = xarray.open_zarr(path, chunks=None)
-    except (OSError, LookupError, ValueError, TypeError) as error:
+    except (OSError, LookupError, RuntimeError, ValueError, TypeError) as error:
         raise InputError(f"is no readable store: {' '.join(str(error).split())}.", Place(str(path))) from None
     return found
 
@@ -281,27 +281,38 @@ def store_path(path: str | Path) -> Path:
     return target
 
 
-def begin(path: Path, layout: Layout, resume: bool) -> Store:
+def begin(path: Path, layout: Layout, resume: bool, part: bool = False) -> Store:
     """Return a store of this layout: a new one, or the existing one if it is of the same case, plan and versions.
 
-    InputError if another one exists, or if one exists and ``resume`` is False.
+    To ``resume`` one that exists is to restore what it has from its beginning, too. InputError if another one exists,
+    or if one exists and is neither to be resumed nor to be joined by another ``part``.
     """
-    if not path.exists():
-        temporary = path.with_name(f".surfacechem-{secrets.token_hex(8)}{STORE_SUFFIX}")
-        store = Store(path, layout)
-        try:
-            with store.writing():
-                _make(temporary, layout)
-            # If several processes start at once the first makes the store, and the others continue with it.
-            with suppress(OSError):
-                temporary.rename(path)
+    store, existed = Store(path, layout), path.exists()
+    if existed and not (resume or part):
+        raise InputError("is there already: --resume goes on with it; or give another name.", Place(str(path)))
+    if existed:
+        _refuse_other(path, layout)
+    if existed and not resume:
+        return store
+    temporary = path.with_name(f".surfacechem-{secrets.token_hex(8)}{STORE_SUFFIX}")
+    try:
+        with store.writing():
+            _make(temporary, layout)
+            if existed:
+                _restore(path, temporary)
                 return store
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-        resume = True
+        try:
+            temporary.rename(path)
+        except OSError:  # several processes started at once: the first has made it, and the others continue with it
+            _refuse_other(path, layout)
+        return store
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _refuse_other(path: Path, layout: Layout) -> None:
+    """Raise InputError unless a folder is a store of the same case, plan and versions."""
     place = Place(str(path))
-    if not resume:
-        raise InputError("is there already: --resume goes on with it; or give another name.", place)
     try:
         there = json.loads((path / "zarr.json").read_text())["attributes"]
         known = (path / MARKS_FOLDER).is_dir() and "sweep" in there
@@ -314,7 +325,15 @@ def begin(path: Path, layout: Layout, resume: bool) -> Store:
     different = [word for name, word in SHARED_ATTRIBUTES.items() if there.get(name) != ours.get(name)]
     if different:
         raise InputError(f"belongs to another sweep. Different: {', '.join(different)}.", place)
-    return Store(path, layout)
+
+
+def _restore(path: Path, made: Path) -> None:
+    """Move the files of a new store into one that exists, whose own may be damaged: they have the same bytes."""
+    for file in made.rglob("*"):
+        if file.is_file():
+            target = path / file.relative_to(made)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            file.replace(target)
 
 
 def _make(path: Path, layout: Layout) -> None:
@@ -335,6 +354,7 @@ def _make(path: Path, layout: Layout) -> None:
             shape=values.shape,
             chunks=tuple(min(size, COORDINATE_PART) for size in values.shape),
             dtype=values.dtype,
+            fill_value=np.nan,  # a part that is lost is not a number, rather than zero
             dimension_names=column.dimensions,
             attributes=column.attributes,
         )

@@ -324,7 +324,7 @@ def stream(
             raise InputError(message, path="sweep.keep")
     checked = plan.size if section.checked == ALL else int(section.checked)
     chunks = ChunkRuns(simulation, plan, keep, changes, checked)
-    store = begin(target, _layout(chunks), resume or part != (1, 1))
+    store = begin(target, _layout(chunks), resume, part != (1, 1))
     return Stream(chunks, store, part)
 
 

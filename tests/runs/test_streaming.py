@@ -349,6 +349,20 @@ def test_a_damaged_chunk_is_computed_again(whole, tmp_path):
     assert digest(path) == digest(whole)
 
 
+def test_what_a_store_has_from_its_beginning_is_restored(whole, tmp_path):
+    """Coordinates, and descriptions of arrays; until then what is lost is not a number, and what is damaged is told."""
+    path = tmp_path / "o.zarr"
+    stored(path)
+    (path / "K_0/c/0").unlink()
+    (path / "status/zarr.json").write_text("{")
+    assert np.all(np.isnan(opened(path).K_0))
+    stored(path, resume=True)
+    assert digest(path) == digest(whole)
+    (path / "K_0/c/0").write_bytes(b"damaged")
+    with pytest.raises(InputError, match="is no readable store: "):
+        opened(path)
+
+
 def test_coordinates_are_written_in_parts(tmp_path, monkeypatch):
     monkeypatch.setattr(store, "COORDINATE_PART", 7)
     with stored(tmp_path / "o.zarr").dataset as data:
