@@ -28,8 +28,8 @@ Array = NDArray[Any]
 HARDEST_RUNS = 100
 """Runs with the most steps that are checked in addition to the sample of the plan."""
 
-RUNS_AT_ONCE = 200
-"""Runs that are checked together, with all their steps in memory."""
+RUNS_AT_ONCE = 50
+"""Runs that are checked together, with all their steps in memory: up to some 10 MB a run. More are no faster."""
 
 BALANCE_COLUMNS = (*BALANCES, "destroys_entropy")
 
@@ -150,7 +150,9 @@ def _errors(
         assert done.accuracy is not None
         values = {name: [end[name] for end in done.run_ends] for name in BALANCE_COLUMNS}
         found = np.maximum(done.accuracy.errors, _apart(chunks, part, done))  # NaN, an unknown error, stays NaN
-        yield first, part, {"error": found, **values}, done.accuracy
+        accuracy = done.accuracy
+        del done  # before the next ones are solved
+        yield first, part, {"error": found, **values}, accuracy
 
 
 def _apart(chunks: ChunkRuns, part: Index, done: SweepSolution) -> Array:

@@ -360,12 +360,17 @@ class Trajectory:
             after = np.concatenate((after, model.inputs(result, *known, segment + 1)))
         return Discontinuities.of(model, np.zeros(len(before), np.int64), before, after)
 
-    @cached_property
+    @property
     def within_bounds(self) -> Trajectory:
         """The trajectory with bonding states that roundoff has made negative set to zero."""
+        return self._brought_back or self
+
+    @cached_property
+    def _brought_back(self) -> Trajectory | None:
+        """The same; None where nothing is negative: kept in itself, a trajectory would outlive its last use."""
         result, steps, least = self.result, self.result.steps, self.model.system.least_states
         if (result.outputs >= least).all() and (steps is None or (steps.y >= least).all()):
-            return self
+            return None
         steps = steps and replace(steps, y=np.maximum(steps.y, least))
         return replace(self, result=result._replace(outputs=np.maximum(result.outputs, least), steps=steps))
 

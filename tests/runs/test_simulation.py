@@ -1,8 +1,10 @@
 """Running a loaded case with changed parameters, times and tolerances."""
 
 import dataclasses
+import gc
 import io
 import pickle
+import weakref
 
 import numpy as np
 import pandas
@@ -130,6 +132,20 @@ def test_the_error_is_found_once_and_when_it_is_asked_for(simulation, monkeypatc
     assert solution.accuracy is solution.accuracy
     assert solution.dataset.error == solution.accuracy.error
     assert len(asked) == 1
+
+
+def test_a_solution_is_freed_with_its_last_name(simulation):
+    """A collector that counts objects does not see how large their arrays are: it comes too late for a loop of runs."""
+    gc.disable()
+    try:
+        solution = simulation.run()
+        assert solution.audit.energy_error < 1e-10
+        assert solution.accuracy.error < 1e-10
+        freed = weakref.ref(solution.trajectory)
+        del solution
+        assert freed() is None
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("name", ["exothermic", "stick-slip", "lithium-charging"])
