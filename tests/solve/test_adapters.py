@@ -75,6 +75,14 @@ def test_traces_in_fast_exchange_do_not_grow_by_the_roundoff_of_their_rates(name
     assert result.counters.steps < 100
 
 
+@pytest.mark.parametrize("name", ["cantera", "cvode"])
+def test_a_first_transient_far_below_the_rounding_of_the_end(name: str) -> None:
+    program = scalar(DY + 1e24 * (Y - 0.5 - se.exp(-T) / 2))
+    result = solver(name).solve(problem(program, [0.5], [0.0, 1.0], 1e-6, atol=1e-12))
+    assert result.status.success
+    assert result.y[0] == pytest.approx(0.5 + np.exp(-1.0) / 2, rel=1e-6)
+
+
 def steep(name: str, row, start: float, end: float, **more):
     """A run of y from 1 on, of which a library keeps the steps."""
     program = scalar(row, 2 * Y * DY)

@@ -28,6 +28,9 @@ LEDGER_UNIT = 1e100
 LONGEST_STEP = 0.1
 """Longest step, as a part of the arc: Cantera cannot be made to end a step at an event."""
 
+ASKED_AHEAD = 1.0
+"""How far ahead of the present time [s] Cantera asks CVODES for a step."""
+
 LONGER = 1000.0
 """How much longer steps may become until derivatives are due anew: as many times as CVODES's increments of variables
 exceed those at which its derivatives, times the step at which it takes them, are roundoff."""
@@ -304,12 +307,14 @@ def last_step(net: Any, start: float, end: float) -> DenseStep:
 class _Stretch(Method):
     together = MOST_TOGETHER
 
-    def __init__(self, view: View, t: float, end: float, y: Array) -> None:
+    def __init__(self, view: View, t: float, end: float, y: Array, ydot: Array) -> None:
         self.view, self.reactor = view, _SystemReactor(_nothing(), view, t, y[view.differential])
         self.net = cantera.ReactorNet([self.reactor])
         self.net.rtol, self.net.atol = view.problem.rtol, self.reactor.tolerance
         self.net.initial_time = t
         self.longest = min(LONGEST_STEP * (end - t), view.problem.spacing)
+        self.first = max(view.first_step(ASKED_AHEAD, y, ydot), np.spacing(t))
+        """Longest first step [s]."""
         self.t, self.end = t, end
         self.last: Array | None = None
         """Variables, in their units, and their first two derivatives after the last step."""
@@ -320,11 +325,11 @@ class _Stretch(Method):
         times, ends = [self.t], np.empty((most + 1, 3, len(state)))
         ends[0] = state if self.last is None else self.last
         growing = self.view.growing_size(self.t, (ends[0, 0] * self.reactor.unit)[: self.reactor.count])
-        longest = self.net.max_time_step = min(self.longest, max(growing, FORMULA_EPS * end))
+        longest = min(self.longest, max(growing, FORMULA_EPS * end))
         while len(times) <= most and times[-1] < end and self.failure is None:
             # Cantera has no stop time, and a step beyond the end would miss what changes there.
-            if end - times[-1] < longest:
-                self.net.max_time_step = max(end - times[-1], FORMULA_EPS * end)
+            self.net.max_time_step = min(longest, max(end - times[-1], FORMULA_EPS * end), self.first)
+            self.first = np.inf
             try:
                 now, row = step(), ends[len(times)]
                 if not now > times[-1]:  # Cantera would go on, across a pole, too
@@ -373,7 +378,7 @@ class CanteraSolver(SteppingSolver):
 
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
         self.check(len(y[view.differential]) + bool(view.program.external))
-        return _Stretch(view, t, end, y)
+        return _Stretch(view, t, end, y, ydot)
 
 
 def make(_name: str) -> CanteraSolver:

@@ -83,7 +83,9 @@ class CVODESolver(SteppingSolver):
             out[:] = view.reduced_jacobian(t + since, x)
 
         self.check(len(y[view.differential]))
-        library = CVODE(rates, atol=view.atol, jacfn=jacobian, **_options(view, t, y))
+        first = view.first_step(end - t, y, ydot)
+        options = _options(view, t, y) | ({"first_step": first} if np.isfinite(first) else {})
+        library = CVODE(rates, atol=view.atol, jacfn=jacobian, **options)
         return _Stretch(library, view.problem.max_steps, t, end, y[view.differential])
 
 
