@@ -284,26 +284,28 @@ def _check_guards(run: Trajectory, inputs: Array) -> None:
 def _check_jumps(solution: Solution, run: Trajectory, side: float) -> None:
     """Refuse a solution that does not conserve the scene's energy in the jumps of the run that make heat of it.
 
-    Its energy on either side of a jump is that on the line through two times, which lie farther from the jump than
-    ``side`` and than the time of the jump may err.
+    Its energy on either side of a jump is that on the parabola through three times, which lie farther from the jump
+    than ``side`` and than the time of the jump may err; it is known to what the line through two of them misses.
     """
     model, columns, late = run.model, run.model.system.state_columns, max(side, RUN_ERROR * run.run.rtol)
     moments = {t: list(jumps) for t, jumps in groupby(run.jumps, key=lambda jump: jump.t)}
     # What the last of ever smaller jumps release is lost in the roundoff of the solution.
     most = max((sum(abs(jump.released) for jump in jumps) for jumps in moments.values()), default=0.0)
     for t, until, jumps in zip(moments, [*moments, run.result.t][1:], moments.values(), strict=False):
-        around = t * (1 + 2 * late * np.array([-2, -1, 1, 2]))
+        around = t * (1 + 2 * late * np.array([-3, -2, -1, 1, 2, 3]))
         released = sum(abs(jump.released) for jump in jumps)
-        if not released or not (t - jumps[0].since <= around[0] and around[3] <= until):
+        if not released or not (t - jumps[0].since <= around[0] and around[-1] <= until):
             continue
         near = solution(around)
         y = np.column_stack([near[name] for name in columns])
-        modes = np.repeat([jumps[0].before.parameters, jumps[-1].after.parameters], 2, axis=0)
+        modes = np.repeat([jumps[0].before.parameters, jumps[-1].after.parameters], 3, axis=0)
         named = model.named(np.column_stack((around, y, np.zeros_like(y), modes)))
         energy = named[:, model.system.output_columns["E_total"]]
-        before, after = 2 * energy[1:3] - energy[::3]
+        bends = energy[[0, 5]] - 2 * energy[[1, 4]] + energy[2:4]
+        before, after = 2 * energy[2:4] - energy[[1, 4]] + bends
         missing = after - before + sum(jump.heat_out - sum(jump.work.values()) for jump in jumps)
-        if not abs(missing) <= (EQUATION_MISMATCH + late) * most + RUN_EPS * np.abs(energy).max():
+        unsure = np.abs(bends).sum() + RUN_EPS * np.abs(energy).max()
+        if not abs(missing) <= (EQUATION_MISMATCH + late) * most + unsure:
             text = f"{abs(missing):.3g} J/m^2 of the {released:.3g} J/m^2 that the scene releases"
             raise InputError(f"at t = {t:.3g} s it misses {text}.")
 

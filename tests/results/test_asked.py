@@ -26,6 +26,7 @@ QUICK = [
     [
         *((name, accuracy) for name in QUICK for accuracy in ACCURACIES[::4]),
         ("film 1e-12", 1e-10),
+        ("case compliant-debonding", 1e-3),
         *(pytest.param(name, each, marks=pytest.mark.slow) for each in ACCURACIES for name in exact(each)),
     ],
 )
