@@ -77,10 +77,13 @@ def is_array(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     # A load that ends the runs must be one ramp without breakpoints.
     jumps = system.solves_jumps or (plan.load and len(problem.segments) > 2)
     plain = run.max_seconds is None and not run.steady and model.program.external is None
-    own = plain and run.solver in (IMPLICIT, EXPLICIT)
-    shared = model.passing.function is None or not (plan.load or model.passing.reads & set(plan.paths))
-    shared = shared and not set(plan.paths) & set(system.cycles)
-    return own and shared and not jumps and _starts_as_given(system, set(plan.paths))
+    own = plain and run.solver in (IMPLICIT, EXPLICIT) and not set(plan.paths) & set(system.cycles)
+    return own and not jumps and _starts_as_given(system, set(plan.paths))
+
+
+def passes_alike(model: Model, plan: Plan) -> bool:
+    """True if prescribed variables pass narrow features at the same times in all runs of a plan, or pass none."""
+    return model.passing.function is None or not (plan.load or model.passing.reads & set(plan.paths))
 
 
 def cannot_jump(model: Model, problem: Problem) -> bool:
@@ -136,6 +139,7 @@ class ArrayRuns:
         # Implicit steps in lanes are for stiffness, of all runs or of those that turn stiff; the other reasons for
         # implicit steps ask for single runs.
         stiff = automatic and run.rtol > MIN_RTOL and not model.system.has_moving_gap
+        self.passes_alike = passes_alike(model, plan)
         self.problem = replace(self._first_problem(changes), explicit=run.solver == EXPLICIT, implicit_lanes=stiff)
         system = model.system
         self.n = len(system.states)
@@ -166,7 +170,8 @@ class ArrayRuns:
         for number in range(min(self.plan.size, FIRST_RUNS)):
             point = {path: float(value[0]) for path, value in self.plan.at(np.array([number])).items()}
             try:
-                return self.model.problem(self.run, self.model.values({**changes, **point}))
+                values = self.model.values({**changes, **point})
+                return self.model.problem(self.run, values, passing=self.passes_alike)
             except InputError as error:
                 refused = error
         raise refused
@@ -217,15 +222,18 @@ class ArrayRuns:
         peaks, none_due = self.guards(rows)
         ends, times = self.ends(rows)
         solved = self._admissible(values, rows) & none_due & np.isfinite(ends) & (ends > 0)
-        # What is chosen is copied.
-        own: Any = slice(None) if solved.all() else np.flatnonzero(solved)
-        y0, table, ends = y0[own], table[own], ends[own]
-        if not len(y0):
-            return solved, {}
-        peaks, times = (shared if len(shared) == 1 else shared[own] for shared in (peaks, times))
         segments = self.problem.segments[None]
         if self.ramp is not None:
             segments = np.column_stack([np.zeros(len(ends)), ends])
+        if not self.passes_alike:
+            cut = np.broadcast_to(segments, (len(ends), segments.shape[1]))[solved], table[solved]
+            solved[solved] = ~self.model.passing.cut(*cut, self.values, self.run.max_steps)
+        # What is chosen is copied.
+        own: Any = slice(None) if solved.all() else np.flatnonzero(solved)
+        y0, table = y0[own], table[own]
+        if not len(y0):
+            return solved, {}
+        peaks, times, segments = (shared if len(shared) == 1 else shared[own] for shared in (peaks, times, segments))
         # The spacing of checks against the equations scales with the run; outputs serve only the kept columns.
         problem = replace(self.problem, times=times[0], record_steps=self.keeps_steps, line_error=0.0)
         spacing = segments[:, -1] / self.run.samples

@@ -548,8 +548,7 @@ class Model:
         segments = pieces.segments(system, end, values)
         parameters = pieces.segment_parameters(system, segments, run.rtol, values)
         if passing:
-            fastest = max((values[path] for path in system.cycles), default=0.0)
-            segments, parameters = self.passing.pieces(segments, parameters, fastest, run.max_steps)
+            segments, parameters = self.passing.pieces(segments, parameters, values, run.max_steps)
         for _ in range(run.closer):
             segments, parameters = pieces.cut(segments, parameters)
         y = system.initial_state(values)

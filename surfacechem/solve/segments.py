@@ -17,7 +17,7 @@ import symengine
 from surfacechem.compile.program import Function, compile_function, needed
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.system import END_PATH, RTOL_PATH, System
-from surfacechem.solve.contract import Array
+from surfacechem.solve.contract import Array, Index, Mask
 from surfacechem.tolerances import FEW_EPS, GUARD_EPS, NEGLIGIBLE
 
 SEGMENTS_PER_CYCLE, MOST_SEGMENTS = 8.17, 20_000
@@ -107,6 +107,9 @@ PARTS_PER_STEP = 10
 parts.
 """
 
+SEARCHED_AT_ONCE = 2**10
+"""Runs of a batch that are searched together: their parts stay in the cache. A choice."""
+
 BISECTIONS = 64
 """Bisections that reduce any part of a run to the last bit of its time."""
 
@@ -116,7 +119,7 @@ class Passing:
 
     def __init__(self, system: System) -> None:
         turns, places = _narrow(system)
-        self.turns = len(turns)
+        self.turns, self._cycles = len(turns), system.cycles
         self._columns = np.array(
             [j for j, p in enumerate(system.parameters) if any(p.symbol in x.free_symbols for x in (*turns, *places))],
             dtype=np.int64,
@@ -130,16 +133,15 @@ class Passing:
             self.function = compile_function([system.t, *symbols], [*turns, *places])
         self._found = lru_cache(maxsize=8)(self._find)
 
-    def pieces(self, segments: Array, table: Array, frequency: float, max_steps: int) -> tuple[Array, Array]:
+    def pieces(self, segments: Array, table: Array, values: Mapping[str, float], max_steps: int) -> tuple[Array, Array]:
         """Return the segments, whose parameters are ``table``, cut at these times, and the new parameters.
 
-        ``frequency`` [1/s] is the highest of a prescribed variable.
+        ``values`` are those of the run by path.
         """
         if self.function is None:
             return segments, table
-        parts = max(TURN_PARTS / (segments[-1] - segments[0]), PARTS_PER_CYCLE * frequency)
-        searched = np.minimum(segments, segments[0] + PARTS_PER_STEP * max_steps / parts)
-        found = self._found(searched.tobytes(), table[:, self._columns].tobytes(), parts)
+        (searched,), (density,) = self._searched(segments[None], values, max_steps)
+        found = self._found(searched.tobytes(), table[:, self._columns].tobytes(), float(density))
         if not len(found):
             return segments, table
         right = np.searchsorted(segments, found)
@@ -149,15 +151,30 @@ class Passing:
         within = np.searchsorted(segments, found) - 1
         return np.insert(segments, within + 1, found), np.insert(table, within + 1, table[within], axis=0)
 
+    def cut(self, segments: Array, table: Array, values: Mapping[str, float], max_steps: int) -> Mask:
+        """Return the mask of runs with such times, from segments [run, end] and their parameters [run, segment,
+        parameter]; ``values`` are what the runs share.
+        """
+        found = np.zeros(len(segments), dtype=bool)
+        for first in range(0, len(segments) if self.function else 0, SEARCHED_AT_ONCE):
+            own = slice(first, first + SEARCHED_AT_ONCE)
+            low, high, piece = _parts(*self._searched(segments[own], values, max_steps))
+            given = table[own, :, self._columns].reshape(-1, len(self._columns))
+            changed, *_ = self._changes(low, high, given[piece], slice(None))
+            found[first + piece[changed] // table.shape[1]] = True
+        return found
+
+    def _searched(self, segments: Array, values: Mapping[str, float], max_steps: int) -> tuple[Array, Array]:
+        """Return the segments [run, end] as far as they are searched, and the number of parts a second [run]."""
+        frequency = max((values[path] for path in self._cycles), default=0.0)
+        density = np.maximum(TURN_PARTS / (segments[:, -1] - segments[:, 0]), PARTS_PER_CYCLE * frequency)
+        return np.minimum(segments, segments[:, :1] + PARTS_PER_STEP * max_steps / density[:, None]), density
+
     def _find(self, segments: bytes, table: bytes, density: float) -> Array:
         """Return all times inside the segments, in order, from a search with ``density`` parts a second."""
         ends = np.frombuffer(segments)
         values = np.frombuffer(table).reshape(len(ends) - 1, -1)
-        parts = np.ceil(density * np.diff(ends)).astype(np.int64)
-        piece = np.repeat(np.arange(len(parts)), parts)
-        into = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
-        low = ends[piece] + into / parts[piece] * np.diff(ends)[piece]
-        high = np.append(low[1:], ends[-1])
+        low, high, piece = _parts(ends[None], np.array([density]))
         turning = self._zeros(low, high, values[piece], slice(0, self.turns)) if self.turns else np.empty(0)
         if len(turning):
             inner = np.searchsorted(low, turning, side="right") - 1
@@ -168,21 +185,39 @@ class Passing:
 
     def _zeros(self, low: Array, high: Array, values: Array, which: slice) -> Array:
         """Return the times at which functions change sign in these intervals, the first time beyond each change."""
-        assert self.function is not None
-        function = self.function
-
-        def at(t: Array, rows: Array) -> Array:
-            return np.sign(function(np.column_stack([t, rows]))[:, which])
-
-        before, after = at(low, values), at(high, values)
-        i, j = np.nonzero((before * after < 0) | ((after == 0) & (before != 0)))
-        low, high, values, side = low[i], high[i], values[i], before[i, j]
+        i, j, side = self._changes(low, high, values, which)
+        low, high, values = low[i], high[i], values[i]
         rows = np.arange(len(i))
         for _ in range(BISECTIONS if len(i) else 0):
             middle = 0.5 * (low + high)
-            ahead = at(middle, values)[rows, j] == side
+            ahead = self._signs(middle, values, which)[rows, j] == side
             low, high = np.where(ahead, middle, low), np.where(ahead, high, middle)
         return np.unique(high) if len(i) else high
+
+    def _changes(self, low: Array, high: Array, values: Array, which: slice) -> tuple[Index, Index, Array]:
+        """Return the intervals in which functions change sign, the functions, and their signs before."""
+        before, after = self._signs(low, values, which), self._signs(high, values, which)
+        i, j = np.nonzero((before * after < 0) | ((after == 0) & (before != 0)))
+        return i, j, before[i, j]
+
+    def _signs(self, t: Array, values: Array, which: slice) -> Array:
+        assert self.function is not None
+        return np.asarray(np.sign(self.function(np.column_stack([t, values]))[:, which]))
+
+
+def _parts(segments: Array, density: Array) -> tuple[Array, Array, Index]:
+    """Return the first and last times of the parts of segments [run, end], of so many a second in each run, and the
+    segment of each, counted over all runs.
+    """
+    widths = np.diff(segments)
+    parts = np.ceil(density[:, None] * widths).astype(np.int64)
+    lengths, counts = widths.ravel(), parts.ravel()
+    piece = np.repeat(np.arange(len(counts)), counts)
+    into = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
+    low = segments[:, :-1].ravel()[piece] + into / counts[piece] * lengths[piece]
+    high = np.append(low[1:], np.nan)
+    high[np.cumsum(parts.sum(axis=1)) - 1] = segments[:, -1]
+    return low, high, piece
 
 
 def _narrow(system: System) -> tuple[list[Expression], list[Expression]]:

@@ -79,6 +79,8 @@ def whole(tmp_path_factory):
     return path
 
 
+X_OFF = "interface.bonding.bell.x_off"
+
 SWEPT = {
     "exothermic": {K_0: [100.0, 300.0], "initial.phi": [0.0, 0.2, 0.4]},
     "shared-load-rupture": {"loading.t_n": [200.0, 517.743, 1000.0]},
@@ -86,6 +88,7 @@ SWEPT = {
     "compliant-debonding": {"interface.bonding.compliant-debonding.t_max": [7e7, 8e7]},
     "stick-slip": {"interface.friction.coulomb.mu_s": [0.6, 0.7]},
     "cooling-to-zero": {"initial.T": [300.0, 310.0]},
+    "catch-bond": {"loading.f": [1e-11, 2e-11]},
 }
 
 
@@ -450,13 +453,25 @@ def test_chunks_are_as_long_as_their_runs_are_brief(name, path, size, monkeypatc
         ("dna-adhesive", None, "eight runs at once, by Radau IIA of order 9"),
         ("dna-adhesive", "radau", "one run after another in the compiled loop, by radau"),
         ("sticky-sphere", None, "one run after another, each prepared in Python, by radau"),
+        ("force-spectroscopy", None, "eight runs at once, by explicit steps of order 8"),
     ],
 )
 def test_the_steps_of_runs_follow_from_stiffness(name, solver, told):
-    path = {"dna-adhesive": "initial.T_2", "sticky-sphere": "mechanics.normal.k"}.get(name, "initial.T")
+    path = {"dna-adhesive": "initial.T_2", "sticky-sphere": "mechanics.normal.k", "force-spectroscopy": X_OFF}.get(
+        name, "initial.T"
+    )
     section = {"over": {path: [300.0]}, "keep": {"last": "all"}}
     simulation = surfacechem.load(name, {"sweep": section, **({"run.solver": solver} if solver else {})})
     assert streaming.steps_of(simulation) == told
+
+
+def test_runs_whose_loads_pass_narrow_features_are_solved_by_themselves():
+    """The rate of the second run is cut off where its exponent overflows: a time at which a step has to end."""
+    simulation = surfacechem.load("force-spectroscopy")
+    chunks = streaming.ChunkRuns(simulation, simulation.plan({X_OFF: [4e-10, 1e-7, 6e-10]}), Keep(), {})
+    done, found = chunks.arrays.solve(chunks.plan.at(np.arange(3)))
+    assert done.tolist() == [True, False, True]
+    assert len(found["steps"]) == 2
 
 
 def test_chunks_of_a_grid_are_blocks_of_it():

@@ -192,7 +192,8 @@ def test_passages_are_found_in_any_number():
     system = Simulation(load_text(text)).system
     values = {p.path: p.at(0.0) for p in system.parameters}
     table = np.array([[values[p.path] for p in system.parameters]])
-    pieces, _ = Passing(system).pieces(np.array([0.0, 3.0]), table, 1000.0, 100_000)
+    passing, many = Passing(system), 100_000
+    pieces, _ = passing.pieces(np.array([0.0, 3.0]), table, values, many)
     turns = [(k + 0.5) * np.pi for k in range(6002)]
     touches = [np.pi + np.arcsin(0.5) + 2 * k * np.pi for k in range(3001)] + [
         2 * np.pi - np.arcsin(0.5) + 2 * k * np.pi for k in range(3001)
@@ -200,6 +201,8 @@ def test_passages_are_found_in_any_number():
     expected = np.sort([(x - 1) / (2000 * np.pi) for x in (*turns, *touches)])
     expected = expected[(expected > 0) & (expected < 3)]
     np.testing.assert_allclose(pieces[1:-1], expected, rtol=1e-13)
+    segments = np.array([[0.0, 3.0], [0.0, 0.9 * expected[0]], [0.9 * expected[0], expected[1]]])
+    assert passing.cut(segments, np.tile(table, (3, 1, 1)), values, many).tolist() == [True, False, True]
 
 
 @pytest.mark.parametrize("far", ["10 nm", "1 mm"])
