@@ -113,9 +113,13 @@ class InstantEvents:
 
     def margins(self) -> Array:
         """Return the guards of the edges at the state set last, infinite if not active."""
-        now, active = self.evaluation.margins(), self.instant.active_guards(self.here())
         self.instant.update_peaks(self.evaluation.y)
-        return np.where(active, now, np.inf)[self.instant.first :]
+        return self.active(self.evaluation.margins())
+
+    def active(self, margins: Array) -> Array:
+        """Return the guards of the edges among margins of shape (..., margins), infinite if not active in the modes."""
+        active = self.system.active_guards(self.evaluation.parameters)
+        return np.where(active, margins, np.inf)[..., self.instant.first :]
 
     def soonest(self) -> float:
         """Return the time [s] in which a guard would reach zero at its present rate."""
@@ -316,13 +320,22 @@ class EmbeddedScene:
         self.put(t, x)
         return self.events.margins()
 
+    def _many(self, times: Array, x: Array, parameters: Array) -> tuple[Array, Array, Array, Array]:
+        """Return states, rates, rates of the ledger and margins at several times, a row each."""
+        y = np.empty((len(times), self.problem.program.n))
+        y[:] = self.evaluation.y  # algebraic variables are searched from the last ones
+        y[:, self.evaluation.free] = x[:, : len(self.states)]
+        return self._evaluations(times, y, parameters)
+
     def many_rates(self, times: Array, x: Array, parameters: Array) -> Array:
         """Return the time derivatives of the variables at several times, a row each; so may be the parameters."""
-        evaluation, y = self.evaluation, np.empty((len(times), self.problem.program.n))
-        y[:] = evaluation.y  # algebraic variables are searched from the last ones
-        y[:, evaluation.free] = x[:, : len(self.states)]
-        _, ydot, ledger, _ = self._evaluations(times, y, parameters)
-        return np.hstack((ydot[:, evaluation.free], ledger))
+        _, ydot, ledger, _ = self._many(times, x, parameters)
+        return np.hstack((ydot[:, self.evaluation.free], ledger))
+
+    def many_transitions(self, times: Array, x: Array, parameters: Array) -> Array:
+        """Return the guards of the transitions at several times, a row each; so may be the parameters."""
+        assert self.events is not None
+        return self.events.active(self._many(times, x, parameters)[3])
 
     def _sizes(self, x: Array) -> Array:
         """Return magnitudes of the states, or their scales if these are larger."""

@@ -136,6 +136,7 @@ class StepWatcher:
             if not len(before):
                 continue
             guards = Guards.of([Guard.stop()] * len(before), partial(self._guards, item))
+            guards.rows = partial(self._guard_rows, item)
             guards.start(before)
             present = guards.values(now, step.y(now))
             t, fired = now, np.flatnonzero(guards.crossed(present)).tolist()
@@ -152,6 +153,16 @@ class StepWatcher:
         if self._is_coupled and self._is_ours:
             self._put(t, y)
         return item.scene.transitions(t, y[self._columns[item]] * item.unit)
+
+    def _guard_rows(self, item: InterfaceReactor, times: Array, rows: Array) -> Array:
+        """Return the guards of an interface at several times and variables of the network, a row each."""
+        parameters = []
+        if self._is_coupled and self._is_ours:
+            for t, y in zip(times.tolist(), rows, strict=True):
+                self._put(t, y)
+                parameters.append(item.parameters_at(t))
+        given = np.array(parameters or item.scene.evaluation.parameters)
+        return item.scene.many_transitions(times, rows[:, self._columns[item]] * item.unit, given)
 
     def _put(self, t: float, y: Array) -> None:
         """Set the reactors to a time and the variables of the network then."""
