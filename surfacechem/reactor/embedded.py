@@ -30,6 +30,9 @@ from surfacechem.solve.instant import Instant
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import DEFAULT_RTOL, NEGLIGIBLE, SQRT_EPS, TINY
 
+NO_SHORTER = "the step size fell to rounding level; the scene may end"
+"""Reason for the end of a scene that no limit explains."""
+
 NO_END = 1e300
 """End of the last load segment [s]."""
 
@@ -280,7 +283,7 @@ class EmbeddedScene:
         self.put(t, x)
         left = np.abs(evaluation.margins()[terminal]) / np.maximum(np.abs(before), TINY)
         if not len(left) or left.min() > STALLED:
-            return "the step size fell to rounding level; the scene may end"
+            return NO_SHORTER
         return self.model.margins[int(terminal[left.argmin()])].reason
 
     def quantity(self, name: str, t: float, x: Array) -> float:

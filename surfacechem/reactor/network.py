@@ -14,8 +14,8 @@ import numpy as np
 
 from surfacechem.errors import InputError
 from surfacechem.reactor.coupling import HeatWall
-from surfacechem.reactor.embedded import ASSUMED_LENGTH
-from surfacechem.reactor.interface_reactor import InterfaceReactor
+from surfacechem.reactor.embedded import ASSUMED_LENGTH, NO_SHORTER
+from surfacechem.reactor.interface_reactor import InterfaceReactor, InterfaceStopped
 from surfacechem.reactor.watch import LATER_AHEAD, StepWatcher
 from surfacechem.solve.adapters.cantera_network import Derivatives, StateVectorReactor, last_step
 from surfacechem.solve.adapters.dense_step import Guards, first_crossing
@@ -319,6 +319,20 @@ class ReactorNet(cantera.ReactorNet):
         )
         interface.record(t)
 
+    def _swiftest(self) -> str:
+        """Describe the variable of the network that changes fastest, beside its value, and what the clock resolves."""
+        y, rates = (np.array(self.get_derivative(k)) for k in range(2))
+        counts = [len(r.scene.states) if isinstance(r, InterfaceReactor) else r.n_vars for r in self.reactors]
+        own = np.hstack([np.arange(r.n_vars) < count for r, count in zip(self.reactors, counts, strict=True)])
+        speeds = np.abs(np.divide(rates, y, out=np.zeros_like(y), where=own & (y != 0)))
+        fastest, start = int(speeds.argmax()), self.initial_time
+        found = f", where {self.component_name(fastest)} changes by {speeds[fastest]:.3g} of itself a second"
+        if abs(start) > self.time - start:
+            found += (
+                f". Times are resolved to {np.spacing(self.time):.1g} s there: let `initial_time` be nearer to zero"
+            )
+        return found
+
     @contextmanager
     def _guarded(self) -> Iterator[None]:
         """Context in which the network stops at breakpoints, and an interface's exception replaces Cantera's."""
@@ -329,6 +343,9 @@ class ReactorNet(cantera.ReactorNet):
         except cantera.CanteraError:
             for interface in self.interfaces:
                 if interface.error is not None:
+                    if interface.reason.startswith(NO_SHORTER):
+                        interface.reason += self._swiftest()
+                        interface.error = InterfaceStopped(interface.reason)
                     interface.end()
                     raise interface.error from None
             raise
