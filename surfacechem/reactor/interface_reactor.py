@@ -444,6 +444,15 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
         for item in self.scene.neighbours:
             yield from item.places
 
+    def temperatures(self) -> Iterator[tuple[int, Any]]:
+        """Yield the places among the scene's parameters of temperatures that reactors give it, and these reactors."""
+        yield from zip(self._input_columns.tolist(), self.bodies.values(), strict=False)
+
+    def transitions(self, t: float) -> Array:
+        """Return the guards of the transitions in the present network at a time [s]."""
+        self._read_network()
+        return self.scene.transitions(t, self.x)
+
     def _refuse_passed(self) -> None:
         """Refuse a state beyond an edge that no network has carried out."""
         if self.scene.events is None:
@@ -496,6 +505,7 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
 
     def jump(self, t: float, index: int | None = None) -> None:
         """Carry out a transition at time t [s], or the due ones if None, and keep the new state."""
+        self._read_network()
         try:
             self.x, booked = self.scene.moved(t, self.x, index)
             jumps = self.scene.events.instant.jumps if self.scene.events else []

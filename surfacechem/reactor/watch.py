@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import cantera
 import numpy as np
 
+from surfacechem.errors import InputError
 from surfacechem.reactor.interface_reactor import InterfaceReactor
 from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_step
 from surfacechem.solve.adapters.dense_step import DenseStep, Guards, first_crossing
@@ -51,6 +52,10 @@ MOST_PANELS = 64
 MOST_HALVINGS = 8
 """Halvings of a panel, a choice: accounts that are roundoff never agree, and 256 panels resolve what a step passes over
 smoothly."""
+
+
+Given = list[tuple[int, int]]
+"""Places among the parameters of an interface and in the network of the same quantities."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +114,29 @@ class StepWatcher:
         ends = np.cumsum([0, *(reactor.n_vars for reactor in self.net.reactors)]).tolist()
         return {reactor: slice(*each) for reactor, each in zip(self.net.reactors, pairwise(ends), strict=True)}
 
+    @cached_property
+    def _temperatures(self) -> dict[InterfaceReactor, Given]:
+        """For interfaces that jump, the temperatures that reactors give them."""
+        return {item: self._given(item) for item in self.interfaces if item.scene.events}
+
+    def _given(self, item: InterfaceReactor) -> Given:
+        """Return where temperatures that reactors give an interface stand, among its parameters and in the network.
+
+        InputError for a reactor without a temperature among its variables.
+        """
+        found = []
+        for place, reactor in item.temperatures():
+            if reactor in self._columns and not isinstance(reactor, StateVectorReactor):  # others hold theirs
+                names = [reactor.component_name(i) for i in range(reactor.n_vars)]
+                if "temperature" not in names:
+                    raise InputError(
+                        f"{item.name} jumps where the temperature of {reactor.name} may have a part, of which only "
+                        "the energy is known inside a step. Let it be an IdealGasReactor or another one with a "
+                        "temperature among its variables."
+                    )
+                found.append((place, self._columns[reactor].start + names.index("temperature")))
+        return found
+
     def restart(self) -> None:
         """Restart, as the integrator does."""
         self.started, self.known, self.event = False, -np.inf, None
@@ -118,7 +146,7 @@ class StepWatcher:
     def ahead(self, goal: float) -> float:
         """Return a time [s] at which a request makes the integrator take one step."""
         now = float(self.net.time)
-        self._before = [item.scene.transitions(now, item.x) for item in self.interfaces]
+        self._before = [item.transitions(now) for item in self.interfaces]
         if self.started:
             return min(goal, now + LATER_AHEAD * float(np.spacing(abs(now))))
         soon = [FIRST_AHEAD * (goal - now)]
@@ -135,8 +163,9 @@ class StepWatcher:
         for item, before in zip(self.interfaces, self._before, strict=True):
             if not len(before):
                 continue
-            guards = Guards.of([Guard.stop()] * len(before), partial(self._guards, item))
-            guards.rows = partial(self._guard_rows, item)
+            given = self._temperatures[item]
+            guards = Guards.of([Guard.stop()] * len(before), partial(self._guards, item, given))
+            guards.rows = partial(self._guard_rows, item, given)
             guards.start(before)
             present = guards.values(now, step.y(now))
             t, fired = now, np.flatnonzero(guards.crossed(present)).tolist()
@@ -148,21 +177,25 @@ class StepWatcher:
         if self._halves and self._is_coupled:  # the guards have displaced the reactors
             self.go(now)
 
-    def _guards(self, item: InterfaceReactor, t: float, y: Array) -> Array:
+    def _guards(self, item: InterfaceReactor, given: Given, t: float, y: Array) -> Array:
         """Return the guards of an interface at a time and the variables of the network."""
         if self._is_coupled and self._is_ours:
             self._put(t, y)
+        for place, column in given:
+            item.scene.evaluation.parameters[place] = y[column]
         return item.scene.transitions(t, y[self._columns[item]] * item.unit)
 
-    def _guard_rows(self, item: InterfaceReactor, times: Array, rows: Array) -> Array:
+    def _guard_rows(self, item: InterfaceReactor, given: Given, times: Array, rows: Array) -> Array:
         """Return the guards of an interface at several times and variables of the network, a row each."""
         parameters = []
         if self._is_coupled and self._is_ours:
             for t, y in zip(times.tolist(), rows, strict=True):
                 self._put(t, y)
                 parameters.append(item.parameters_at(t))
-        given = np.array(parameters or item.scene.evaluation.parameters)
-        return item.scene.many_transitions(times, rows[:, self._columns[item]] * item.unit, given)
+        table = np.array(parameters or [item.scene.evaluation.parameters] * len(times))
+        for place, column in given:
+            table[:, place] = rows[:, column]
+        return item.scene.many_transitions(times, rows[:, self._columns[item]] * item.unit, table)
 
     def _put(self, t: float, y: Array) -> None:
         """Set the reactors to a time and the variables of the network then."""

@@ -149,6 +149,36 @@ def test_beside_a_closed_chamber():
     assert float(solution.dataset["T_2"][-1]) > 300.05
 
 
+HEATED = """
+bodies: {plate: {temperature: 300 K}, chamber: {temperature: 300 K}}
+interface:
+  temperature: T_c
+  friction: [coulomb: {mu: {value: 0.5, times: [linear: {of: T_c, slope: -0.002, about: 300}]}}]
+heat: [conductance: {between: [plate, interface], h: 1e7}, conductance: {between: [chamber, interface], h: 1e7}]
+mechanics: {tangential: {k: 1 MPa/mm, c_b: 1e6 Pa s/m}}
+loading: {p: 1 MPa, w_t: 0.4 mm}
+initial: {T_c: 300 K}
+run: {until: 3 s}
+"""
+
+
+def test_a_slip_begins_where_a_gas_has_warmed_the_contact_enough():
+    """The temperature of the gas inside a step is that of the step, not that of the last evaluation."""
+    chamber, around = (ct.IdealGasReactor(ct.Solution(yaml=GAS), clone=True) for _ in range(2))
+    around.phase.TP = 600, ct.one_atm
+    around.syncState()
+    ct.Wall(chamber, ct.Reservoir(around.phase, clone=True), U=chamber.mass * chamber.phase.cv_mass)
+    interface, net = network(HEATED, area=1e-14, bodies={"chamber": chamber})
+    net.rtol = 1e-6
+    net.advance(3.0)
+    # Friction has fallen to the force of the spring at 400 K, between 300 K and a chamber at 500 K.
+    assert [jump.edge.name for jump in interface.scene.events.instant.jumps] == ["slip forward"]
+    assert interface.scene.events.instant.jumps[0].t == pytest.approx(np.log(3.0), abs=1e-4)
+    _, net = network(HEATED, bodies={"chamber": ct.Reactor(ct.Solution(yaml=GAS), clone=True)})
+    with pytest.raises(InputError, match=r"of which only the energy is known inside a step\. Let it"):
+        net.advance(3.0)
+
+
 def test_accounts_beside_a_gas_are_those_beside_a_body():
     """The first bonds produce entropy that the integrator's steps do not resolve; what the gas receives is its sum."""
     chamber = ct.IdealGasReactor(ct.Solution(yaml=GAS), clone=True, volume=2.0)
