@@ -19,6 +19,7 @@ from surfacechem.expressions import certain, derivative
 from surfacechem.format.plans import Plan
 from surfacechem.model.system import System
 from surfacechem.results.audit import LAST_DIGITS, residuals, resolved
+from surfacechem.results.store import CHUNK_BYTES
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import REACHES, STATUSES, Columns, Keep, crossed, reason_table, variable
 from surfacechem.solve import EXPLICIT, IMPLICIT
@@ -27,14 +28,14 @@ from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.lanes.lane_batch import solve_batch
 from surfacechem.solve.radau.solver import Room, consistent, peaks_before, put_rates, solve_arrays
 from surfacechem.solve.radau.stepper import ARCS, END, EVENTS, FIRST_COUNTER, JUMPS, OUTPUTS, RECORDS
-from surfacechem.solve.run import Discontinuities, Model, Run
+from surfacechem.solve.run import Discontinuities, Model, Run, are_stable, guessed_temperatures
 from surfacechem.tolerances import EPS, GUARD_EPS, MICROMETRE, MIN_RTOL, PICOMETRE
 
 MOST_ROWS = 4096, 1024
 """Largest numbers of steps and events of a run for which memory is allocated; a run with more is solved by itself."""
 
-PILOT_RUNS = 16
-"""Runs of a batch from which the numbers of steps and events of the others are estimated."""
+PILOT_RUNS, USUAL_STEPS = 16, 100
+"""Runs from which the numbers of steps and events of the others are estimated, and the number of steps before."""
 
 FIRST_RUNS = 100
 """Runs of a plan among which an admissible one is searched for, whose problem the others share."""
@@ -115,11 +116,10 @@ def all_above(table: Array, least: float, columns: Sequence[int] | Index) -> Mas
 
 
 def _starts_as_given(system: System, swept: set[str]) -> bool:
-    """True if states start at given values or their logarithms, and no state or register has to be searched for."""
-    searched = [state for state in system.states if state.algebraic]
+    """True if states start at given values or their logarithms, or are found from them, and no register is."""
     made = [state for state in system.states if state.given is not None and state.given.state and state.path in swept]
     registers = [register for register in system.registers if register.given is not None]
-    return not (searched or made or registers)
+    return not (made or registers)
 
 
 class ArrayRuns:
@@ -127,6 +127,8 @@ class ArrayRuns:
 
     jumps = False
     """True if runs go on after their jumps."""
+    room: Room | None = None
+    """Table sizes of a run, of steps and events among others, as large as earlier runs needed; None before."""
 
     def __init__(
         self, model: Model, plan: Plan, run: Run, changes: Mapping[str, float], keep: Keep, automatic: bool
@@ -154,6 +156,7 @@ class ArrayRuns:
         self.keeps_extremes = bool(keep.max or keep.min)
         self.breaks = self.problem.segments[1:-1]
         self.keeps_steps = self.keeps_extremes or bool(keep.reach and len(self.breaks))
+        self.keeps_inside = self.jumps and (self.keeps_steps or bool(keep.reach))
         self.impacts = [len(model.margins) + j for j, edge in enumerate(system.edges) if edge.is_impact]
         """Columns of the guards of impacts."""
         self.no_peaks = peaks_before(self.problem)[None]
@@ -216,8 +219,32 @@ class ArrayRuns:
 
     # -- from values to arrays ----------------------------------------------------------------------------------------
 
+    @property
+    def at_once(self) -> int:
+        """Number of runs computed at once, small enough that outputs and all derived arrays stay small."""
+        system, steps = self.model.system, self.room[0] if self.room else USUAL_STEPS * self.keeps_steps
+        points = max(len(self.shape), 1) + steps
+        row = 8 * points * (4 * len(system.inputs) + 4 * len(system.outputs) + len(system.ledger))
+        return max(CHUNK_BYTES // (2 * row), 1)
+
     def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
         """Solve runs with these values; return the mask of runs with a certain result, and their columns."""
+        count = len(next(iter(values.values())))
+        if self.room is None and (self.keeps_steps or self.jumps):
+            stride = max(count // PILOT_RUNS, 1)
+            self._solve({path: column[::stride] for path, column in values.items()})
+        size = self.at_once
+        parts = [
+            self._solve({path: column[first : first + size] for path, column in values.items()})
+            for first in range(0, count, size)
+        ]
+        if len(parts) == 1:
+            return parts[0]
+        found = [columns for _, columns in parts if columns]
+        whole = {name: np.concatenate([each[name] for each in found]) for name in found[0]} if found else {}
+        return np.concatenate([done for done, _ in parts]), whole
+
+    def _solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
         table, y0, rows = self.starts(values)
         peaks, none_due = self.guards(rows)
         ends, times = self.ends(rows)
@@ -225,6 +252,7 @@ class ArrayRuns:
         segments = self.problem.segments[None]
         if self.ramp is not None:
             segments = np.column_stack([np.zeros(len(ends)), ends])
+        solved[solved] = self._are_found(y0[solved], table[solved, 0])
         if not self.passes_alike:
             cut = np.broadcast_to(segments, (len(ends), segments.shape[1]))[solved], table[solved]
             solved[solved] = ~self.model.passing.cut(*cut, self.values, self.run.max_steps)
@@ -243,10 +271,38 @@ class ArrayRuns:
         solved[solved] = clear
         return solved, {name: column[clear] for name, column in columns.items()}
 
+    def _are_found(self, y0: Array, parameters: Array) -> Mask:
+        """Return the mask of starts from which stable temperatures above zero are found where there is no capacity; the
+        others are searched for run by run.
+        """
+        system, program = self.model.system, self.model.program
+        guessed = guessed_temperatures(system)
+        if not (guessed.any() and len(y0)):
+            return np.ones(len(y0), dtype=bool)
+        found = consistent(program, 0.0, y0, np.zeros_like(y0), parameters)
+        return found.valid & (found.y[:, guessed] > 0).all(axis=1) & are_stable(system, program, y0, parameters)
+
     def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:
         """Solve the runs; ``others`` are spacing, peaks, segments and times as the stepper takes them."""
         *_, segments, times = others
-        return Ends(solve_batch(problem, y0, table, *others), table, segments, times)
+        return Ends(self._filled(problem, (y0, table, *others)), table, segments, times)
+
+    def _filled(self, problem: Problem, columns: Sequence[Array]) -> Any:
+        """Return the batch of the runs, which are repeated if their tables were too small."""
+        fits = False
+        while not fits:
+            room = self.room or (0, len(problem.margins), 0, 0)
+            batch = self._batch(problem, columns, room)
+            steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST_ROWS).tolist()
+            needed = steps * self.keeps_steps, events, 0, events * self.keeps_inside
+            fits = all(each <= had for each, had in zip(needed, room, strict=True))
+            grown = tuple(max(each + each // 4, had) for each, had in zip(needed, room, strict=True))
+            self.room = room if fits else grown
+        return batch
+
+    def _batch(self, problem: Problem, columns: Sequence[Array], room: Room) -> Any:
+        """Return the batch of the runs, with tables of a size."""
+        return solve_batch(problem, *columns, room=room)
 
     def starts(self, values: Mapping[str, Array]) -> tuple[Array, Array, Array]:
         """Return parameters [run, segment, parameter], initial states [run, state] and both as rows of arguments."""
@@ -524,8 +580,6 @@ class JumpingRuns(ArrayRuns):
     """Runs of a plan with their jumps as arrays."""
 
     jumps = True
-    room: Room = 0, 16, 0, 0
-    """Table sizes of a run, of steps and events among others; as large as earlier runs needed."""
 
     def guards(self, rows: Array) -> tuple[Array, Mask]:
         """Return zero accounts and guards; edges may be due in all runs."""
@@ -533,23 +587,14 @@ class JumpingRuns(ArrayRuns):
 
     def _solved(self, problem: Problem, y0: Array, table: Array, *others: Array) -> Ends:
         """Solve runs along their edges; repeat them if their tables were too small."""
-        jumper, keeps_inside = self.model.jumper, self.keeps_steps or bool(self.keep.reach)
+        jumper = self.model.jumper
         assert jumper is not None
         jumper.expect_jumps()
-        problem, columns = replace(problem, edges=jumper.edge_tables), (y0, table, *others)
-        # A few pilot runs give the table sizes of the others.
-        pilots = np.arange(0, len(y0), max(len(y0) // PILOT_RUNS, 1))
-        few = [column[pilots] if len(column) == len(y0) else column for column in columns]
-        for given in (few, columns):
-            fits = False
-            while not fits:
-                room = self.room
-                batch = solve_arrays(problem, *given, room=room)
-                steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST_ROWS).tolist()
-                needed = steps * self.keeps_steps, events, 0, events * keeps_inside
-                fits = all(each <= had for each, had in zip(needed, room, strict=True))
-                if not fits:
-                    self.room = tuple(max(each + each // 4, had) for each, had in zip(needed, room, strict=True))
+        batch = self._filled(replace(problem, edges=jumper.edge_tables), (y0, table, *others))
         arcs = batch.arcs
         begun = np.where(np.arange(arcs.shape[1]) < batch.counts[:, ARCS, None], arcs[..., 0], np.inf)
         return Ends(batch, arcs[..., 5:], np.column_stack([begun, np.full(len(y0), np.inf)]), others[-1])
+
+    def _batch(self, problem: Problem, columns: Sequence[Array], room: Room) -> Any:
+        """Return the batch of the runs along their edges, with tables of a size."""
+        return solve_arrays(problem, *columns, room=room)

@@ -20,7 +20,7 @@ from surfacechem.format.plans import Plan, recorded_plan
 from surfacechem.format.sections import ALL, SweepSection
 from surfacechem.results.dataset import quantities
 from surfacechem.results.netcdf import CONVENTIONS, COORDINATES, Column, cf_unit, versions
-from surfacechem.results.store import CHUNK_BYTES, Layout, Store, StoredArray, begin, opened, store_path
+from surfacechem.results.store import Layout, Store, StoredArray, begin, opened, store_path
 from surfacechem.runs import checking, keeping, sweeps
 from surfacechem.runs.arrays import ArrayRuns, JumpingRuns, cannot_jump, is_array
 from surfacechem.runs.at_rest import NoSteadyStateError, refuse_histories, to_steady_state
@@ -126,12 +126,7 @@ class ChunkRuns:
     @cached_property
     def piece(self) -> int:
         """Number of runs computed at once, small enough that outputs and all derived arrays stay small."""
-        system = self.model.system
-        if self.arrays is None:
-            return 2**6
-        points = max(len(self.arrays.shape), 1) + (100 if self.arrays.keeps_steps else 0)
-        row = 8 * points * (4 * len(system.inputs) + 4 * len(system.outputs) + len(system.ledger))
-        return int(np.clip(CHUNK_BYTES // (2 * row), 2**6, RUNS_OF_A_PIECE))
+        return 2**6 if self.arrays is None else int(np.clip(self.arrays.at_once, 2**6, RUNS_OF_A_PIECE))
 
     def flags(self, name: str) -> dict[str, Any]:
         """Return the attributes with codes and their meanings, if the variable holds codes."""

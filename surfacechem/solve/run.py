@@ -417,12 +417,12 @@ def stable_guess(system: System, program: Program, y: Array, parameters: Array) 
     Heat production that grows with temperature can balance the losses twice: in a stable state, and at a higher
     temperature in one from which any perturbation leads to ignition or cooling.
     """
-    if not any(state.algebraic and state.is_temperature for state in system.states):
+    guessed = guessed_temperatures(system)
+    if not guessed.any():
         return y
-    guessed = np.array([state.algebraic and state.is_temperature for state in system.states])
-    if not _are_stable(system, program, y[None], parameters)[0]:
+    if not are_stable(system, program, y[None], parameters)[0]:
         tried = np.array([np.where(guessed, part * y, y) for part in COLDER_GUESSES])
-        stable = _are_stable(system, program, tried, parameters)
+        stable = are_stable(system, program, tried, parameters)
         y = tried[int(stable.argmax())] if stable.any() else y
     found = consistent(program, 0.0, y, np.zeros_like(y), parameters)
     if found.valid and np.any(found.y[guessed] <= 0):
@@ -434,14 +434,22 @@ def stable_guess(system: System, program: Program, y: Array, parameters: Array) 
     return y
 
 
-def _are_stable(system: System, program: Program, y: Array, parameters: Array) -> NDArray[np.bool_]:
-    """Return a mask of the first guesses that lead to states in which all stability limits are positive."""
-    active = system.active_guards(parameters)
+def guessed_temperatures(system: System) -> Mask:
+    """Return the mask of states that are temperatures without capacity, of which starts give first guesses."""
+    return np.array([state.algebraic and state.is_temperature for state in system.states], dtype=bool)
+
+
+def are_stable(system: System, program: Program, y: Array, parameters: Array) -> Mask:
+    """Return a mask of the first guesses [run, state] that lead to states in which all stability limits are positive;
+    parameters are one vector or one for each run.
+    """
+    active = system.active_guards(np.atleast_2d(parameters)[0])
     checks = [i for i, m in enumerate(system.event_margins) if m.stability and active[i]]
     if not checks or program.margins is None:
         return np.ones(len(y), dtype=bool)
     found = consistent(program, 0.0, y, np.zeros_like(y), parameters)
-    rows = np.concatenate([np.zeros((len(y), 1)), found.y, found.ydot, np.tile(parameters, (len(y), 1))], axis=1)
+    parameters = np.broadcast_to(parameters, (len(y), parameters.shape[-1]))
+    rows = np.concatenate([np.zeros((len(y), 1)), found.y, found.ydot, parameters], axis=1)
     return np.asarray(found.valid & np.all(np.atleast_2d(program.margins(rows))[:, checks] > 0, axis=1))
 
 

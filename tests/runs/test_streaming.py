@@ -22,7 +22,7 @@ from surfacechem.cli.main import app
 from surfacechem.errors import InputError, OutputError
 from surfacechem.results import store
 from surfacechem.results.store import Layout, StoredArray, opened
-from surfacechem.runs import checking, streaming
+from surfacechem.runs import arrays, checking, streaming
 from surfacechem.runs.checking import check
 from surfacechem.runs.keeping import STATUSES, Keep, extremes
 from surfacechem.runs.summaries import store_summary
@@ -472,6 +472,37 @@ def test_runs_whose_loads_pass_narrow_features_are_solved_by_themselves():
     done, found = chunks.arrays.solve(chunks.plan.at(np.arange(3)))
     assert done.tolist() == [True, False, True]
     assert len(found["steps"]) == 2
+
+
+def test_temperatures_without_capacity_are_found_at_the_starts_of_all_runs_at_once():
+    simulation = surfacechem.load("three-temperatures-no-capacity")
+    keep = Keep(last=("T_c", "T_1"), max=("T_c",), min=("T_2",))
+    plan = simulation.plan({"bodies.lower.C": [100.0, 200.0, 300.0]})
+    chunks = streaming.ChunkRuns(simulation, plan, keep, {})
+    done, found = chunks.arrays.solve(plan.at(np.arange(3)))
+    assert done.all()
+    alone = chunks.one_by_one.columns(chunks._solved(plan.at(np.arange(3)), np.arange(3)), len(chunks.run.times))
+    assert len(set(alone["T_c_last"])) == 3
+    for name in ("steps", "T_c_last", "T_1_last", "T_c_max", "T_2_min"):
+        np.testing.assert_array_equal(found[name], alone[name], err_msg=name)
+
+
+def test_runs_with_more_steps_than_usual_are_computed_in_smaller_parts(monkeypatch):
+    """Tables for all steps of all runs would not stay small."""
+    simulation = surfacechem.load("exothermic")
+    plan = simulation.plan({K_0: {"from": 100, "to": 300, "points": 20}})
+    runs = streaming.ChunkRuns(simulation, plan, Keep(last=("T",), max=("q_1",)), {}).arrays
+    done, whole = runs.solve(plan.at(np.arange(20)))
+    usual = runs.at_once
+    runs.room = (1000, *runs.room[1:])
+    assert runs.at_once < usual / 5
+    monkeypatch.setattr(arrays, "CHUNK_BYTES", arrays.CHUNK_BYTES * 3 // runs.at_once)
+    assert runs.at_once == 3
+    again, parts = runs.solve(plan.at(np.arange(20)))
+    assert done.all()
+    assert again.all()
+    for name, values in whole.items():
+        np.testing.assert_array_equal(parts[name], values, err_msg=name)
 
 
 def test_chunks_of_a_grid_are_blocks_of_it():
