@@ -174,36 +174,46 @@ class StepWatcher:
                 t, fired = first_crossing(step, guards, np.isfinite(present), 0.0)
             if fired and (self.event is None or t < self.event.t):
                 self.event = InterfaceEvent(t, item, fired[0])
-        if self._halves and self._is_coupled:  # the guards have displaced the reactors
+        if self._is_coupled:  # the guards have displaced the reactors
             self.go(now)
 
     def _guards(self, item: InterfaceReactor, given: Given, t: float, y: Array) -> Array:
         """Return the guards of an interface at a time and the variables of the network."""
-        if self._is_coupled and self._is_ours:
-            self._put(t, y)
-        for place, column in given:
-            item.scene.evaluation.parameters[place] = y[column]
+        if self._is_coupled:
+            item.scene.evaluation.parameters[:] = self._parameters(item, given, t, y)
         return item.scene.transitions(t, y[self._columns[item]] * item.unit)
 
     def _guard_rows(self, item: InterfaceReactor, given: Given, times: Array, rows: Array) -> Array:
         """Return the guards of an interface at several times and variables of the network, a row each."""
-        parameters = []
-        if self._is_coupled and self._is_ours:
-            for t, y in zip(times.tolist(), rows, strict=True):
-                self._put(t, y)
-                parameters.append(item.parameters_at(t))
-        table = np.array(parameters or [item.scene.evaluation.parameters] * len(times))
-        for place, column in given:
-            table[:, place] = rows[:, column]
+        table = item.scene.evaluation.parameters
+        if self._is_coupled:
+            moments = zip(times.tolist(), rows, strict=True)
+            table = np.array([self._parameters(item, given, t, y) for t, y in moments])
         return item.scene.many_transitions(times, rows[:, self._columns[item]] * item.unit, table)
+
+    def _parameters(self, item: InterfaceReactor, given: Given, t: float, y: Array) -> Array:
+        """Return the parameters of an interface at a time in a step and the variables of the network then.
+
+        Reactors of Cantera cannot be set back to it; what edges depend on is read from their variables.
+        """
+        self._set(y)
+        parameters = item.parameters_at(t)
+        for place, column in given:
+            parameters[place] = y[column]
+        return parameters
+
+    def _set(self, y: Array) -> None:
+        """Set the reactors that are set from Python to the variables of the network."""
+        for reactor, columns in self._columns.items():
+            if isinstance(reactor, StateVectorReactor):
+                reactor.put(y[columns])
 
     def _put(self, t: float, y: Array) -> None:
         """Set the reactors to a time and the variables of the network then."""
-        if not self._is_ours:
+        if self._is_ours:
+            self._set(y)
+        else:
             self.go(max(t, float(self.net.time)))  # the first request after a start has passed a little of the step
-            return
-        for reactor, columns in self._columns.items():
-            reactor.put(y[columns])
 
     def go(self, t: float) -> None:
         """Let the integrator set all reactors to a time that is not before the last one."""

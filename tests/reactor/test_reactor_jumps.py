@@ -33,6 +33,10 @@ def compare(interface, solution, within):
         assert interface[state] == pytest.approx(column[-1], abs=within * np.abs(column).max(), rel=0)
 
 
+GAS = """
+phases: [{name: gas, thermo: ideal-gas, species: [N2], state: {T: 300 K, P: 1 atm}}]
+species: [{name: N2, composition: {N: 2}, thermo: {model: constant-cp, cp0: 30 J/mol/K}}]
+"""
 CLOCK = """
 title: A plate that is heated at a constant power
 T_0: 300 K
@@ -46,11 +50,12 @@ run: {until: 1 s}
 """
 
 
-def test_events_that_depend_on_another_interface():
+@pytest.mark.parametrize("beside", [[], [GAS]])
+def test_events_that_depend_on_another_interface(beside):
     """Its state is that of the time at which a guard is wanted, and its step may be short after a jump of the other."""
     block, clock = InterfaceReactor("stick-slip"), InterfaceReactor(CLOCK)
     block.load("p", lambda _: 1e5 * (clock["T"] - 299.5))
-    net = ReactorNet([clock, block])
+    net = ReactorNet([clock, *(ct.IdealGasReactor(ct.Solution(yaml=gas), clone=True) for gas in beside), block])
     net.rtol, net.atol = 1e-10, 1e-14
     net.advance(0.9)
     data = block.dataset  # the spring pulls with 1e5 t, and the static friction is 0.6 p
@@ -115,10 +120,6 @@ def test_single_steps_end_at_the_event():
     assert all(later > before for before, later in pairwise(times))
 
 
-GAS = """
-phases: [{name: gas, thermo: ideal-gas, species: [N2], state: {T: 300 K, P: 1 atm}}]
-species: [{name: N2, composition: {N: 2}, thermo: {model: constant-cp, cp0: 30 J/mol/K}}]
-"""
 CHAMBER = """
 bodies:
   block: {{temperature: T_1, C: 500 J/m^2/K, capacity: constant}}
