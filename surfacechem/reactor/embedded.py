@@ -235,6 +235,12 @@ class EmbeddedScene:
         """Names of the ledger's lines."""
         return tuple(account.quantity.name for account in self.model.system.ledger)
 
+    def edge_that_reads(self, load: str) -> str:
+        """Return the name of an edge whose guard contains a load; empty if none does."""
+        system = self.model.system
+        symbol = system.parameters[self.places[f"loading.{load}.level"]].symbol
+        return next((edge.name for edge in system.edges if depends(system.expand(edge.guard), symbol)), "")
+
     def account(self, name: str) -> int:
         """Return the index among the variables of the heat that a replaced body needs to keep its temperature."""
         wanted = f"H_T_{coupling.suffix_of(self.case.scene, name)}"

@@ -222,6 +222,7 @@ class StepWatcher:
     def follow(self, end: float) -> None:
         """Go to a time in the step, and keep the panels on the way there."""
         start, self._end = self._end, end
+        before = self._decisive_loads(start)
         if end > start:
             assert self._step is not None
             cycles = [item.scene.values[path] for item in self.interfaces for path in item.scene.model.system.cycles]
@@ -229,9 +230,28 @@ class StepWatcher:
             length = (end - start) / count
             self._panels += [self._panel(self._step, start + k * length, length) for k in range(count)]
         self.go(end)
+        if before != (now := self._decisive_loads(start)):
+            edge, name = next(each for each in before if before[each] != now[each])
+            raise InputError(
+                f"{edge} depends on the load {name}, which reads a reactor that cannot be set back to a time inside a "
+                "step. Let the load follow from time and from interfaces."
+            )
+        self.go(end)
         self._reached = [item.x for item in self.interfaces]
         if len(self._panels) >= MOST_PANELS:
             self.book()
+
+    @cached_property
+    def _decisive(self) -> list[tuple[InterfaceReactor, str, str]]:
+        """Interfaces, edges and the loads that these read, if there are reactors that cannot be set from Python."""
+        loads = [(item, name) for item in self.interfaces if not self._is_ours for name in item.loads]
+        return [(item, edge, name) for item, name in loads if (edge := item.scene.edge_that_reads(name))]
+
+    def _decisive_loads(self, t: float) -> dict[tuple[str, str], float]:
+        """Return these loads at a time [s], at the states then of reactors that are set from Python, of others now."""
+        if self._decisive and self._step:
+            self._set(self._step.y(t))
+        return {(edge, name): item.loads[name](t) for item, edge, name in self._decisive}
 
     def book(self) -> None:
         """Integrate the ledgers along the panels kept so far.

@@ -180,6 +180,17 @@ def test_a_slip_begins_where_a_gas_has_warmed_the_contact_enough():
         net.advance(3.0)
 
 
+def test_a_load_that_reads_a_gas_decides_no_jump():
+    """Its value inside a step is not known; that of a time would be."""
+    chamber, outside = (ct.IdealGasReactor(ct.Solution(yaml=GAS), clone=True) for _ in range(2))
+    ct.Wall(chamber, outside, Q=lambda t: 1e3 * t)
+    block, message = InterfaceReactor("stick-slip"), "depends on the load p, which reads a reactor that cannot be set"
+    block.load("p", lambda _: chamber.phase.P)
+    net = ReactorNet([chamber, outside, block])
+    with pytest.raises(InputError, match=message):
+        net.advance(0.6)
+
+
 def test_accounts_beside_a_gas_are_those_beside_a_body():
     """The first bonds produce entropy that the integrator's steps do not resolve; what the gas receives is its sum."""
     chamber = ct.IdealGasReactor(ct.Solution(yaml=GAS), clone=True, volume=2.0)
