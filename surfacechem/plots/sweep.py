@@ -227,7 +227,7 @@ def arranged(dataset: Data) -> Data:
     found = replace(dataset, coords=[*coords, *(name for name in dataset.coords if name not in coords)])
     found = _along_first(found, coords) if plan.zipped else found
     for axis in {*axes_of(found)}.intersection(coords):
-        if np.any(np.diff(values := found[axis].values) < 0):
+        if found[axis].kind == "f" and np.any(np.diff(values := found[axis].values) < 0):
             order, variables = np.argsort(values), dict(found.variables)
             for name, each in found.variables.items():
                 if axis in each.dims:

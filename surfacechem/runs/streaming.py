@@ -309,6 +309,8 @@ def stream(
     part: tuple[int, int] = (1, 1),
 ) -> Stream:
     """Prepare a sweep into a store, which is created, or opened to be continued."""
+    if part[0] not in range(1, part[1] + 1):
+        raise InputError(f"{part[0]} of {part[1]} is no part; the first of 16 is (1, 16).", Place(path="part"))
     target, case = store_path(path), simulation.case
     section = case.sweep or SweepSection()
     keep = keep_of(section.keep, sweeps.prepared(simulation.system, plan))

@@ -425,6 +425,8 @@ def _subjects(
 ) -> list[Subject]:
     """Return the cases; InputError for a case given twice, and for a variable that none has."""
     subjects = [subject(load(name, overrides)) for name in cases]
+    if not subjects:
+        raise InputError("at least one is needed.", Place(path="cases"))
     names = [one.case.name for one in subjects]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise InputError(f"the case {twice} is given twice.")

@@ -190,6 +190,13 @@ def test_edited_datasets(files, which, count, tmp_path, monkeypatch):
             is_used_or_refused(tmp_path / f"{i}.nc", again=which != "study" and i % 4 == 0)
 
 
+def test_a_sweep_whose_parameter_is_text_is_refused(files, tmp_path):
+    dataset = xarray.open_dataset(files["sweep"]).load()
+    dataset.assign_coords(loading_f=dataset.loading_f.astype(str)).to_netcdf(tmp_path / "text.nc")
+    with pytest.raises(InputError, match="loading_f does not hold numbers in double precision"):
+        plots.figure(tmp_path / "text.nc")
+
+
 def test_a_read_only_file_system_is_told_with_the_name_of_the_file(tmp_path, monkeypatch):
     def refused(*_, **__):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))

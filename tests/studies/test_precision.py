@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 import surfacechem
 from surfacechem.cli.main import app
+from surfacechem.errors import InputError
 from surfacechem.plots import figure
 from surfacechem.plots.study import LABEL_VARIABLES
 from surfacechem.solve.adapters import sundials
@@ -268,3 +269,8 @@ def test_bad_input_is_refused_before_anything_runs(arguments, message, tmp_path,
     assert done.exit_code == 2, done.output
     assert message in done.output
     assert list(tmp_path.iterdir()) == []
+
+
+def test_no_case_is_no_study():
+    with pytest.raises(InputError, match="cases: at least one is needed"):
+        surfacechem.precision([])
