@@ -219,6 +219,15 @@ class Store:
             self._arrays[name] = _zarr().open_array(self.path / name, mode="r+")
         return self._arrays[name]
 
+    def restore(self) -> None:
+        """Make anew what a store has from its beginning, with the same bytes: it may be damaged."""
+        with self.writing(), _made(self.path, self.layout) as made:
+            for file in made.rglob("*"):
+                if file.is_file():
+                    target = self.path / file.relative_to(made)
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    file.replace(target)
+
     @contextmanager
     def writing(self) -> Iterator[None]:
         """Raise OutputError if writing to the disk fails."""
@@ -281,31 +290,32 @@ def store_path(path: str | Path) -> Path:
     return target
 
 
-def begin(path: Path, layout: Layout, resume: bool, part: bool = False) -> Store:
+def begin(path: Path, layout: Layout, resume: bool) -> Store:
     """Return a store of this layout: a new one, or the existing one if it is of the same case, plan and versions.
 
-    To ``resume`` one that exists is to restore what it has from its beginning, too. InputError if another one exists,
-    or if one exists and is neither to be resumed nor to be joined by another ``part``.
+    InputError if another one exists, or if one exists and ``resume`` is False.
     """
-    store, existed = Store(path, layout), path.exists()
-    if existed and not (resume or part):
-        raise InputError("is there already: --resume goes on with it; or give another name.", Place(str(path)))
-    if existed:
+    store = Store(path, layout)
+    if path.exists():
+        if not resume:
+            raise InputError("is there already: --resume goes on with it; or give another name.", Place(str(path)))
         _refuse_other(path, layout)
-    if existed and not resume:
         return store
-    temporary = path.with_name(f".surfacechem-{secrets.token_hex(8)}{STORE_SUFFIX}")
-    try:
-        with store.writing():
-            _make(temporary, layout)
-            if existed:
-                _restore(path, temporary)
-                return store
+    with store.writing(), _made(path, layout) as made:
         try:
-            temporary.rename(path)
+            made.rename(path)
         except OSError:  # several processes started at once: the first has made it, and the others continue with it
             _refuse_other(path, layout)
-        return store
+    return store
+
+
+@contextmanager
+def _made(path: Path, layout: Layout) -> Iterator[Path]:
+    """Make a store without values beside the path; what is left of it is removed."""
+    temporary = path.with_name(f".surfacechem-{secrets.token_hex(8)}{STORE_SUFFIX}")
+    try:
+        _make(temporary, layout)
+        yield temporary
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 
@@ -325,15 +335,6 @@ def _refuse_other(path: Path, layout: Layout) -> None:
     different = [word for name, word in SHARED_ATTRIBUTES.items() if there.get(name) != ours.get(name)]
     if different:
         raise InputError(f"belongs to another sweep. Different: {', '.join(different)}.", place)
-
-
-def _restore(path: Path, made: Path) -> None:
-    """Move the files of a new store into one that exists, whose own may be damaged: they have the same bytes."""
-    for file in made.rglob("*"):
-        if file.is_file():
-            target = path / file.relative_to(made)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            file.replace(target)
 
 
 def _make(path: Path, layout: Layout) -> None:

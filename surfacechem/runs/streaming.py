@@ -213,6 +213,8 @@ class Stream:
     chunks: ChunkRuns = field(repr=False)
     store: Store
     part: tuple[int, int] = (1, 1)
+    resumed: bool = field(default=False, repr=False)
+    """True if the store is an earlier one, of which all but its chunks is made anew first."""
 
     @property
     def numbers(self) -> range:
@@ -228,6 +230,8 @@ class Stream:
         """
         layout = self.store.layout
         with self.store.locked(f"{self.part[0]}-of-{self.part[1]}"):
+            if self.resumed:
+                self.store.restore()
             numbers = list(self.numbers)
             missing = [number for number in numbers if not self.store.done(number)]
             runs, resumed = layout.runs_of(numbers), layout.runs_of(set(numbers) - set(missing))
@@ -321,8 +325,8 @@ def stream(
             raise InputError(message, path="sweep.keep")
     checked = plan.size if section.checked == ALL else int(section.checked)
     chunks = ChunkRuns(simulation, plan, keep, changes, checked)
-    store = begin(target, _layout(chunks), resume, part != (1, 1))
-    return Stream(chunks, store, part)
+    store = begin(target, _layout(chunks), resume or part != (1, 1))
+    return Stream(chunks, store, part, resume)
 
 
 def _layout(chunks: ChunkRuns) -> Layout:
