@@ -327,7 +327,8 @@ class Temperature(Content):
         if not is_name(tree):
             return Prescribed("K", above_zero=True).read(tree, name, context)
         if not NODE_NAME.fullmatch(value) or value == "T_0":
-            hint = "T_0 is the reference temperature" if value == "T_0" else f"start it with T, for example T_{value}"
+            plain = "use T, followed by letters from A to Z, digits or _, for example T_plate"
+            hint = "T_0 is the reference temperature" if value == "T_0" else plain
             raise tree.error(f"'{value}' cannot name a temperature: {hint}.")
         return str(value)
 

@@ -94,7 +94,7 @@ def labels(datasets: Sequence[Data]) -> list[str]:
     known = [_settings(dataset) for dataset in datasets]
     every = dict.fromkeys(chain.from_iterable(known))
     paths = [path for path in every if len({each.get(path) for each in known}) > 1]
-    texts = [str(dataset.attrs.get("title", "")) for dataset in datasets]
+    texts = [str(dataset.attrs.get("title", "")).replace("$", r"\$") for dataset in datasets]
     # More differences than fit into a legend are those of different cases, which differ in their titles.
     if 0 < len(paths) <= MOST_DIFFERENCES:
         names = _short(paths)

@@ -68,7 +68,7 @@ WITHOUT_PREFIX = (0.1, 1e3)
 
 PREFIXES = {-5: "f", -4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
 
-TITLE_STYLE: Any = {"x": 0.01, "ha": "left", "fontsize": 11, "fontweight": "bold"}
+TITLE_STYLE: Any = {"x": 0.01, "ha": "left", "fontsize": 11, "fontweight": "bold", "parse_math": False}
 NOTE_STYLE: Any = {"fontsize": 8, "color": "#555555"}
 """Style of the title of a figure, and of a note above its panels."""
 

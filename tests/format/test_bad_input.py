@@ -60,6 +60,7 @@ MISTAKES = [
     ("upper: {temperature: T,", "upper: {temperature: -5,", "4: bodies.upper.temperature: -5 K is not an absolute t"),
     ("upper: {temperature: T,", "upper: {temperature: 25 C,", "4: bodies.upper.temperature: 25 C is an electric char"),
     ("upper: {temperature: T,", "upper: {temperature: mu,", "4: bodies.upper.temperature: 'mu' cannot name a temper"),
+    ("upper: {temperature: T,", "upper: {temperature: T_ä,", "'T_ä' cannot name a temperature: use T, followed by let"),
     ("upper: {temperature: T,", "upper: {temperature: T_1,", "4: bodies.upper.temperature: 'T_1' is temperature of"),
     ("bodies:", "bodys:", "2: unknown key 'bodys'. Did you mean 'bodies'? Known: T_0, bodies,"),
     ("heat:", "friction: []\nheat:", "14: unknown key 'friction'. It belongs under `interface`; see"),

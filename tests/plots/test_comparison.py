@@ -68,6 +68,8 @@ def test_datasets_that_differ_in_all_are_named_by_title_or_file(runs, tmp_path):
     other = solution.dataset
     assert labels([opened(runs[0]), opened(other)]) == ["A body cools to a reservoir", "Two bodies exchange heat"]
     assert labels([opened(runs[0])] * 2) == ["dataset 1", "dataset 2"]
+    figure([runs[0], other.assign_attrs(title="$x_$")]).canvas.draw()  # no formula
+    figure(other.assign_attrs(title="$x_$")).canvas.draw()
     solution.write(tmp_path / "pair.nc")
     with pytest.raises(InputError, match=r"pair\.nc: no variable 'lost_1'"):
         figure([runs[0].assign(lost_1=runs[0]["T_1"]), tmp_path / "pair.nc"], ["lost_1"])
