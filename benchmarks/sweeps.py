@@ -1,10 +1,10 @@
 """Sweeps into a store: time of all and of the stepper alone, memory, and the same work by other libraries.
 
 Times are seconds of processors, so that what else a machine does counts as little as can be; each figure is that of a
-process of its own. ``python benchmarks/sweeps.py [RUNS]``; peers that are not installed are left out. What is "bare"
-keeps no balances; what is "loose" has a tolerance of 1e-5, and takes linearly implicit steps if it is stiff; "alone"
-means `solver: radau`, by which the stiff runs of `dna-adhesive` are solved one at a time. The time "s" is that of a
-clock, on all processors.
+process of its own. ``python benchmarks/sweeps.py [RUNS]``; peers that are not installed are left out. What is "whole"
+keeps ends, extremes and events of all quantities, as sweeps do by default; what is "bare" keeps no balances; what is
+"loose" has a tolerance of 1e-5, and takes linearly implicit steps if it is stiff; "alone" means `solver: radau`, by
+which the stiff runs of `dna-adhesive` are solved one at a time. The time "s" is that of a clock, on all processors.
 """
 
 from __future__ import annotations
@@ -18,8 +18,11 @@ from tempfile import TemporaryDirectory
 
 K_0 = "interface.potential.bond-energy.K_0"
 ENDS = {"last": ["T", "phi"]}
+WHOLE = dict.fromkeys(("last", "max", "min", "events"), "all")
 SWEPT = {
     "exothermic": (K_0, 1.0, 300.0, ENDS),
+    "exothermic, whole": (K_0, 1.0, 300.0, WHOLE),
+    "force-spectroscopy, whole": ("interface.bonding.bell.x_off", 3e-10, 5e-10, WHOLE),
     "exothermic, bare": (K_0, 1.0, 300.0, {**ENDS, "balances": "none"}),
     "exothermic, bare and loose": (K_0, 1.0, 300.0, {**ENDS, "balances": "none"}),
     "shared-load-rupture": ("loading.t_n", 600.0, 1000.0, {"last": ["phi"]}),
@@ -235,6 +238,8 @@ def main(runs: int) -> None:
     for case, count in (
         ("exothermic", runs // 10),
         ("exothermic", runs),
+        ("exothermic, whole", runs // 20),
+        ("force-spectroscopy, whole", runs // 20),
         ("exothermic, bare", runs),
         ("exothermic, bare and loose", runs),
         ("shared-load-rupture", runs // 10),

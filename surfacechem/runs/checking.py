@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.format.plans import permuted
+from surfacechem.results.error_estimates import state_floors
 from surfacechem.results.store import StoredArray
 from surfacechem.runs.keeping import BALANCES, END_COLUMNS, EXTREMES, STATUSES, Keep, RunByRun
 from surfacechem.runs.sweeps import SweepAccuracy, SweepSolution, unknown_in
@@ -157,9 +158,9 @@ def _errors(
 
 def _apart(chunks: ChunkRuns, part: Index, done: SweepSolution) -> Array:
     """Return the difference between the stored ends of runs and the ends of the same runs solved by themselves, beyond
-    roundoff: of states relative to the latter, of other variables, such as fluxes that vanish at rest, relative to
-    their largest values over the run. The same for stored extremes, which those of all states that the latter pass
-    through, inside their steps too, may exceed.
+    roundoff: of states relative to the latter, above their absolute tolerances, of other variables, such as fluxes that
+    vanish at rest, relative to their largest values over the run. The same for stored extremes, which those of all
+    states that the latter pass through, inside their steps too, may exceed.
 
     For a run stopped by an event only the time counts: there the state may change by any amount within the last digit
     of the time. Runs to a steady state, solved by themselves, all last as long as the slowest of them: only their
@@ -172,6 +173,8 @@ def _apart(chunks: ChunkRuns, part: Index, done: SweepSolution) -> Array:
     over_run = {at: np.fmax(np.abs(ends[f"{name}_max"]), np.abs(ends[f"{name}_min"])) for at, name in wide.items()}
     stored, largest = chunks.columns(part), np.zeros(len(part))
     least = {at: ERROR_FLOOR * np.nanmax(np.abs(ends[at]), initial=TINY) for at in ("time_reached", *kept.single)}
+    floors = np.array([state_floors(run.stored) for run in done.runs])
+    least |= {f"{name}_last": floors[:, states[name]] for name in kept.last if name in states}
     if chunks.run.steady:
         least = {f"{s.name}_last": s.scale for s in chunks.model.system.states if s.name in kept.last}
     rounded = [run.sample.roundings for run in done.runs]

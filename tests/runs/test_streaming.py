@@ -590,6 +590,14 @@ def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypa
     assert sorted(steps[few]) == sorted(np.sort(steps)[-3:])
 
 
+def test_what_is_left_below_the_tolerance_is_no_error(tmp_path):
+    """Bonds that have all but vanished in every run that is checked."""
+    stream = begun(case("force-spectroscopy", {"last": "all"}, {X_OFF: [4.98e-10, 5e-10]}), tmp_path / "o.zarr")
+    stream.run(1)
+    assert np.all(abs(stream.store.dataset["phi_last"]) < 1e-15)
+    assert check(stream).error < 1e-9
+
+
 def test_a_notebook_shows_where_a_store_is_and_not_all_that_it_is_made_of(tmp_path):
     stream = begun(case(keep=ENDS, over={"initial.T": [290, 310]}), tmp_path / "o.zarr")
     assert repr(stream) == f"Stream(store={stream.store}, part=(1, 1))"
