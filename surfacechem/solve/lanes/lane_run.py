@@ -47,7 +47,7 @@ the last, they reach the shortest steps that matter.
 """
 CONSTANTS = RATES + 1
 """Row of the constants in the table of addresses."""
-FREE_LANES = 2
+FREE_LANES = 4
 """Number of free lanes at which new runs begin, which divides the number of lanes: a choice. A smaller one fills the
 lanes better, a larger one shares the cost of starts and ends among more runs.
 """
