@@ -120,6 +120,11 @@ class Number(Content):
             spec = spec._replace(unit=TOTAL_UNITS.get(spec.unit, spec.unit))
         if not isinstance(tree.value, dict) or not (spec.varies or "value" in tree.value):
             return number(tree, spec, name, context, difference=self.difference)
+        return self._varying(tree, spec, name, context)
+
+    @staticmethod
+    def _varying(tree: Tree, spec: Spec, name: str, context: Context) -> float | Varying:
+        """Return a value with its factors, which are given by a mapping."""
         if not spec.varies:
             raise tree.error(f"{name} cannot vary; give it a value.")
         parts = tree.mapping(["value", "times"])

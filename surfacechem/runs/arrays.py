@@ -156,7 +156,6 @@ class ArrayRuns:
         self.keeps_extremes = bool(keep.max or keep.min)
         self.breaks = self.problem.segments[1:-1]
         self.keeps_steps = self.keeps_extremes or bool(keep.reach and len(self.breaks))
-        self.keeps_inside = self.jumps and (self.keeps_steps or bool(keep.reach))
         self.impacts = [len(model.margins) + j for j, edge in enumerate(system.edges) if edge.is_impact]
         """Columns of the guards of impacts."""
         self.no_peaks = peaks_before(self.problem)[None]
@@ -289,12 +288,12 @@ class ArrayRuns:
 
     def _filled(self, problem: Problem, columns: Sequence[Array]) -> Any:
         """Return the batch of the runs, which are repeated if their tables were too small."""
-        fits = False
+        keeps_inside, fits = self.jumps and (self.keeps_steps or bool(self.keep.reach)), False
         while not fits:
             room = self.room or (0, len(problem.margins), 0, 0)
             batch = self._batch(problem, columns, room)
             steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST_ROWS).tolist()
-            needed = steps * self.keeps_steps, events, 0, events * self.keeps_inside
+            needed = steps * self.keeps_steps, events, 0, events * keeps_inside
             fits = all(each <= had for each, had in zip(needed, room, strict=True))
             grown = tuple(max(each + each // 4, had) for each, had in zip(needed, room, strict=True))
             self.room = room if fits else grown

@@ -4,7 +4,7 @@ found as for a single run.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -156,6 +156,19 @@ def _errors(
         yield first, part, {"error": found, **values}, accuracy
 
 
+def _least_sizes(chunks: ChunkRuns, done: SweepSolution, ends: Mapping[str, Array]) -> Mapping[str, Any]:
+    """Return by column what a difference is relative to at least: of states their absolute tolerance, of others a small
+    part of the largest one.
+    """
+    kept, system = chunks.keep, chunks.model.system
+    last = {f"{name}_last": column for name, column in system.state_columns.items() if name in kept.last}
+    if chunks.run.steady:
+        return {name: system.states[column].scale for name, column in last.items()}
+    floors = np.array([state_floors(run.stored) for run in done.runs])
+    least = {at: ERROR_FLOOR * np.nanmax(np.abs(ends[at]), initial=TINY) for at in ("time_reached", *kept.single)}
+    return least | {name: floors[:, column] for name, column in last.items()}
+
+
 def _apart(chunks: ChunkRuns, part: Index, done: SweepSolution) -> Array:
     """Return the difference between the stored ends of runs and the ends of the same runs solved by themselves, beyond
     roundoff: of states relative to the latter, above their absolute tolerances, of other variables, such as fluxes that
@@ -171,12 +184,7 @@ def _apart(chunks: ChunkRuns, part: Index, done: SweepSolution) -> Array:
     keep = Keep(last=kept.last, max=(*wide.values(),), min=(*wide.values(),))
     ends = RunByRun(chunks.model, keep).columns([run.stored for run in done.runs], 0, done.audits)
     over_run = {at: np.fmax(np.abs(ends[f"{name}_max"]), np.abs(ends[f"{name}_min"])) for at, name in wide.items()}
-    stored, largest = chunks.columns(part), np.zeros(len(part))
-    least = {at: ERROR_FLOOR * np.nanmax(np.abs(ends[at]), initial=TINY) for at in ("time_reached", *kept.single)}
-    floors = np.array([state_floors(run.stored) for run in done.runs])
-    least |= {f"{name}_last": floors[:, states[name]] for name in kept.last if name in states}
-    if chunks.run.steady:
-        least = {f"{s.name}_last": s.scale for s in chunks.model.system.states if s.name in kept.last}
+    stored, largest, least = chunks.columns(part), np.zeros(len(part)), _least_sizes(chunks, done, ends)
     rounded = [run.sample.roundings for run in done.runs]
     # Inside steps the states have the error of their polynomial, which is an error of the runs that is known.
     inside = dict.fromkeys(EXTREMES, max(RUN_ERROR, POLYNOMIAL_ERROR * chunks.run.rtol / EPS))
