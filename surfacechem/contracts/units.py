@@ -237,7 +237,7 @@ def parse(
 
 def _number(value: object, unit: str, name: str, difference: bool) -> float:
     if getattr(value, "ndim", None) == 0:  # a zero-dimensional array, as from indexing xarray
-        value = listed(value)
+        value = plain_values(value)
     if isinstance(value, Real) and not isinstance(value, bool):
         return _as_float(value)
     if not isinstance(value, str):
@@ -252,10 +252,10 @@ def _number(value: object, unit: str, name: str, difference: bool) -> float:
     return _converted(found[1], found[2], unit, name, difference) if found[2] else float(found[1])
 
 
-def listed(array: Any) -> Any:
+def plain_values(array: Any) -> Any:
     """Return the numbers of an array of NumPy, xarray or Pint; where it says its unit, as texts with that unit.
 
-    >>> listed(np.array([1.5, 2.0])), listed(np.float64(3.0))
+    >>> plain_values(np.array([1.5, 2.0])), plain_values(np.float64(3.0))
     ([1.5, 2.0], 3.0)
     """
     number = getattr(array, "magnitude", array)

@@ -19,7 +19,7 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from surfacechem.contracts.units import listed
+from surfacechem.contracts.units import plain_values
 from surfacechem.errors import InputError, Place, nearest, refuse_unknown, suggestion
 
 # Largest depth of nested mappings and lists.
@@ -367,7 +367,7 @@ def join(path: str, key: str) -> str:
 def from_plain(value: object, place: Place) -> Tree:
     """Return a tree of plain Python data at one place, in which keys of mappings continue its path."""
     if hasattr(value, "ndim"):  # an array of NumPy, xarray or Pint
-        value = listed(value)
+        value = plain_values(value)
     if isinstance(value, Mapping):
         entries = ((str(key), item) for key, item in value.items())
         return Tree({key: from_plain(item, replace(place, path=join(place.path, key))) for key, item in entries}, place)

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.contracts.units import QUANTITY, listed, parse
+from surfacechem.contracts.units import QUANTITY, parse, plain_values
 from surfacechem.documents.document import OVERRIDE, Tree, parameter_path
 from surfacechem.errors import PATHS, InputError, Place, refuse_unknown
 from surfacechem.format import data_files
@@ -463,7 +463,7 @@ def split_arrays(over: Mapping[str, object]) -> tuple[dict[str, object], dict[st
     lists, arrays = dict(over), {}
     for path, values in over.items():
         if isinstance(values, Collection) and not isinstance(values, str | list | tuple | Mapping):
-            lists[path] = listed(values)
+            lists[path] = plain_values(values)
             array = np.asarray(lists[path])
             if array.ndim == 1 and array.dtype.kind in "iuf":
                 lists[path], arrays[path] = [], array.astype(float)

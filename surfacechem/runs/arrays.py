@@ -128,7 +128,9 @@ class ArrayRuns:
     jumps = False
     """True if runs go on after their jumps."""
     room: Room | None = None
-    """Table sizes of a run, of steps and events among others, as large as earlier runs needed; None before."""
+    """Table sizes of a run, of steps and events among others, as large as earlier runs needed; None for the usual."""
+    most_steps = USUAL_STEPS
+    """Largest number of steps of earlier runs, where steps are kept."""
 
     def __init__(
         self, model: Model, plan: Plan, run: Run, changes: Mapping[str, float], keep: Keep, automatic: bool
@@ -221,17 +223,15 @@ class ArrayRuns:
     @property
     def at_once(self) -> int:
         """Number of runs computed at once, small enough that outputs and all derived arrays stay small."""
-        system, steps = self.model.system, self.room[0] if self.room else USUAL_STEPS * self.keeps_steps
-        points = max(len(self.shape), 1) + steps
+        system, points = self.model.system, max(len(self.shape), 1) + self.most_steps * self.keeps_steps
         row = 8 * points * (4 * len(system.inputs) + 4 * len(system.outputs) + len(system.ledger))
         return max(CHUNK_BYTES // (2 * row), 1)
 
     def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
         """Solve runs with these values; return the mask of runs with a certain result, and their columns."""
         count = len(next(iter(values.values())))
-        if self.room is None and (self.keeps_steps or self.jumps):
-            stride = max(count // PILOT_RUNS, 1)
-            self._solve({path: column[::stride] for path, column in values.items()})
+        if self.room is None and count > PILOT_RUNS:
+            self._solve({path: column[:: count // PILOT_RUNS] for path, column in values.items()})
         size = self.at_once
         parts = [
             self._solve({path: column[first : first + size] for path, column in values.items()})
@@ -290,17 +290,19 @@ class ArrayRuns:
         """Return the batch of the runs, which are repeated if their tables were too small."""
         keeps_inside, fits = self.jumps and (self.keeps_steps or bool(self.keep.reach)), False
         while not fits:
-            room = self.room or (0, len(problem.margins), 0, 0)
-            batch = self._batch(problem, columns, room)
+            batch = self._batch(problem, columns, self.room)
             steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST_ROWS).tolist()
             needed = steps * self.keeps_steps, events, 0, events * keeps_inside
-            fits = all(each <= had for each, had in zip(needed, room, strict=True))
-            grown = tuple(max(each + each // 4, had) for each, had in zip(needed, room, strict=True))
-            self.room = room if fits else grown
+            had = batch.records.shape[1], batch.events.shape[1], 0, batch.jumps.shape[1]
+            fits = all(each <= rows for each, rows in zip(needed, had, strict=True))
+            if not (fits and self.room):
+                room = self.room or (0, len(problem.margins), 0, 0)
+                self.room = tuple(max(each + each // 4, rows) for each, rows in zip(needed, room, strict=True))
+            self.most_steps = max(self.most_steps, steps)
         return batch
 
-    def _batch(self, problem: Problem, columns: Sequence[Array], room: Room) -> Any:
-        """Return the batch of the runs, with tables of a size."""
+    def _batch(self, problem: Problem, columns: Sequence[Array], room: Room | None) -> Any:
+        """Return the batch of the runs, with tables of a size; of the usual one by default."""
         return solve_batch(problem, *columns, room=room)
 
     def starts(self, values: Mapping[str, Array]) -> tuple[Array, Array, Array]:
@@ -594,6 +596,6 @@ class JumpingRuns(ArrayRuns):
         begun = np.where(np.arange(arcs.shape[1]) < batch.counts[:, ARCS, None], arcs[..., 0], np.inf)
         return Ends(batch, arcs[..., 5:], np.column_stack([begun, np.full(len(y0), np.inf)]), others[-1])
 
-    def _batch(self, problem: Problem, columns: Sequence[Array], room: Room) -> Any:
-        """Return the batch of the runs along their edges, with tables of a size."""
+    def _batch(self, problem: Problem, columns: Sequence[Array], room: Room | None) -> Any:
+        """Return the batch of the runs along their edges, with tables of a size; of the usual one by default."""
         return solve_arrays(problem, *columns, room=room)

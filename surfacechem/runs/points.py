@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.compile.program import compile_function, expanded, jacobian
 from surfacechem.contracts.terms import Load
-from surfacechem.contracts.units import listed, parse, quotient
+from surfacechem.contracts.units import parse, plain_values, quotient
 from surfacechem.documents import document
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, refuse_unknown
@@ -404,7 +404,7 @@ def _capacities(system: System, scene: Scene, given: Mapping[str, Argument]) -> 
 def _numbers(name: str, value: ArrayLike, unit: str) -> Array:
     """Return the values of a column in SI; a text is a quantity with its unit."""
     if hasattr(value, "attrs") or hasattr(value, "magnitude"):  # of xarray or Pint, which may say its unit
-        value = listed(value)
+        value = plain_values(value)
     if isinstance(value, str):
         return np.array([parse(value, unit, name=name)])
     if isinstance(value, list | tuple) and any(isinstance(x, str) for x in value):
