@@ -404,7 +404,9 @@ class SongYovanovich(Conforming):
 
     def relative_pressure(self, p: Expression) -> Expression:
         """Pressure relative to the hardness at the size of the contact spots."""
-        return power(p / (self.c_1 * self.indent**self.c_2), 1 / (1 + 0.071 * self.c_2))
+        # Powers of bounded exponents, however large factors make the size index.
+        exponent = 1 / (1 + 0.071 * self.c_2)
+        return power(p / self.c_1, exponent) * self.indent ** (-self.c_2 * exponent)
 
     def conductance(self, p: Expression) -> Expression:
         """Conductance [W/(m^2 K)]."""

@@ -56,11 +56,14 @@ def test_the_size_of_indents_is_that_of_contact_spots():
     assert np.abs(1.62 * x**0.071 / (np.sqrt(2 * np.pi) * radius) - 1).max() < 0.08
 
 
-def test_the_hardness_is_that_of_indents_of_this_size():
-    law = SongYovanovich(**SURFACE, c_1=6e9, c_2=-0.26)
+@pytest.mark.parametrize("c_2", [-0.26, 371.0])
+def test_the_hardness_is_that_of_indents_of_this_size(c_2):
+    """The second index is that of a factor that runs away with temperature; of its hardness only the logarithm is a
+    number.
+    """
+    law = SongYovanovich(**{**SURFACE, "sigma": 5e-9}, c_1=6e9, c_2=c_2)
     x = law.relative_pressure(2e6)
-    hardness = 6e9 * (1.62 * (1e-6 / 0.1 / 1e-6) * x**0.071) ** -0.26
-    assert x == pytest.approx(2e6 / hardness, rel=1e-12)
+    assert np.log(x) == pytest.approx(np.log(2e6 / 6e9) - c_2 * np.log(1.62 * 5e-9 / 0.1 / 1e-6 * x**0.071), rel=1e-12)
 
 
 def test_indices_of_roelands_are_those_of_the_slopes():
