@@ -148,7 +148,7 @@ def suggestion(name: str, known: Iterable[str], listed_by: str = "") -> str:
 
 
 def refuse_unknown(
-    names: Iterable[str], known: Collection[str], message: str, place: Place | None = None, listed_by: str = ""
+    names: Iterable[object], known: Collection[str], message: str, place: Place | None = None, listed_by: str = ""
 ) -> None:
     """Raise InputError for the first name that is not among the known ones; {} in the message stands for it.
 
@@ -158,8 +158,20 @@ def refuse_unknown(
     surfacechem.errors.InputError: no parameter 'mu_s'. Did you mean 'mu'? Known: k, mu.
     """
     for name in names:
-        if name not in known:
+        if not isinstance(name, str) or name not in known:
             raise InputError(f"{message.replace('{}', str(name))}.{suggestion(str(name), known, listed_by)}", place)
+
+
+def expect(value: object, kinds: type | tuple[type, ...], wanted: str, place: Place | None = None) -> None:
+    """Raise InputError for a value from Python that is none of these kinds; ``wanted`` says what is.
+
+    >>> expect(3, str, "a case is a text")
+    Traceback (most recent call last):
+        ...
+    surfacechem.errors.InputError: a case is a text, not int.
+    """
+    if not isinstance(value, kinds):
+        raise InputError(f"{wanted}, not {type(value).__name__}.", place)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

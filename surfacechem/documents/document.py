@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from io import StringIO
 from numbers import Integral, Real
@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from surfacechem.contracts.units import plain_values
-from surfacechem.errors import InputError, Place, nearest, refuse_unknown, suggestion
+from surfacechem.errors import InputError, Place, expect, nearest, refuse_unknown, suggestion
 
 # Largest depth of nested mappings and lists.
 MOST_NESTED = 24
@@ -391,6 +391,10 @@ EMPTY_VALUES = (None, "")
 SHORTHAND_KEYS = {"interface.mechanism": "file"}
 
 
+CHANGES = "changes are texts `path=value`, or values by path"
+"""What messages say of changes that are something else."""
+
+
 def overridden(tree: Tree, overrides: str | Sequence[str] | Mapping[str, object]) -> Tree:
     """Return the tree with the given values; texts are "path=value" with the value in YAML.
 
@@ -438,19 +442,23 @@ def parameter_path(path: str, known: Container[str]) -> str:
     >>> parameter_path("loading.v", {"loading.v.level"}), parameter_path("friction.mu.value", {"friction.mu"})
     ('loading.v.level', 'friction.mu')
     """
+    expect(path, str, CHANGES, Place(OVERRIDE))
     above, _, last = path.rpartition(".")
     others = [path, f"{path}.level", *([above] if last in VALUE_KEYS else [])]
     return next((other for other in others if other in known), path)
 
 
 def _pairs(overrides: str | Sequence[str] | Mapping[str, object]) -> Iterator[tuple[str, Tree]]:
+    expect(overrides, (str, Collection), CHANGES, Place(OVERRIDE))
     given: list[tuple[str, object]] = list(overrides.items()) if isinstance(overrides, Mapping) else []
     for text in () if isinstance(overrides, Mapping) else as_texts(overrides):
+        expect(text, str, CHANGES, Place(OVERRIDE))
         path, equals, after = text.partition("=")
         if not equals or not path.strip():
             raise InputError(f"'{text}' is not of the form path=value, for example `run.until=5 s`.", Place(OVERRIDE))
         given.append((path.strip(), after))
     for path, value in given:
+        expect(path, str, CHANGES, Place(OVERRIDE))
         place = Place(OVERRIDE, 0, path)
         try:
             plain = parse(value).plain() if isinstance(value, str) and value.strip() else value

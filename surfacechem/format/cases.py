@@ -27,7 +27,7 @@ from surfacechem import documents, laws
 from surfacechem.contracts.terms import Law
 from surfacechem.documents import document
 from surfacechem.documents.document import Tree
-from surfacechem.errors import InputError, Place, PlacedError, nearest
+from surfacechem.errors import InputError, Place, PlacedError, expect, nearest
 from surfacechem.format import data_files
 from surfacechem.format.reader import ExactSolution, exact_solution_of, read_document, run_of, scene_of
 from surfacechem.format.sections import NOTHING_SWEPT, SweepSection
@@ -196,9 +196,7 @@ def load(source: Source, overrides: Overrides = ()) -> Case:
         file, content = Path(str(getattr(source, "name", "case.yaml"))), source.read()
         text = content if isinstance(content, str) else document.decoded(content, Place(str(file)))
         return load_text(text, file.stem, file.parent, overrides=overrides, file=str(file))
-    if not isinstance(source, str | Path):
-        message = f"a case is a path, a name, a text, a mapping or an open file, not {type(source).__name__}."
-        raise InputError(message)
+    expect(source, (str, Path), "a case is a path, a name, a text, a mapping or an open file")
     path, shown = _find(str(source))
     return load_text(document.read(path, shown), path.stem, path.parent, overrides=overrides, file=shown)
 

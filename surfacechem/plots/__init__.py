@@ -5,11 +5,11 @@ Only Matplotlib's object-oriented interface is used: nothing here opens windows 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, expect
 from surfacechem.plots.style import COLOURS, STYLE, in_celsius, opened, save, write
 
 if TYPE_CHECKING:
@@ -83,5 +83,6 @@ def _check_choice(variables: Sequence[str] | None, against: str | None) -> None:
     """Raise InputError if the variables are no list, or only the variable of the axis."""
     if isinstance(variables, str):
         raise InputError(f"variables are a list of names, not '{variables}'; a figure is written by its savefig.")
+    expect(variables, (Collection, type(None)), "variables are a list of names")
     if variables and {*variables} == {against}:
         raise InputError(f"{against} is the axis: name other variables, or leave `against` out.")

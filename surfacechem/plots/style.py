@@ -25,7 +25,7 @@ from matplotlib.ticker import Formatter, LogFormatterSciNotation, LogLocator
 from numpy.typing import NDArray
 
 from surfacechem.contracts.units import ZERO_CELSIUS
-from surfacechem.errors import InputError, Place
+from surfacechem.errors import InputError, Place, expect
 from surfacechem.quantities import GREEK, SUPERSCRIPTS, VARIABLES, raised, spelled
 from surfacechem.results.netcdf import Data, DataVariable, read_netcdf, reading, replacing
 from surfacechem.tolerances import RUN_EPS
@@ -146,8 +146,11 @@ def write(plot: Figure, target: Path) -> None:
 
 def opened(data: Data | xarray.Dataset | str | Path) -> Data:
     """Return a dataset, read from its netCDF file or its store if need be; InputError if the file is none."""
+    if isinstance(data, Data):
+        return data
     if not isinstance(data, str | Path):
-        return data if isinstance(data, Data) else Data.of(data)
+        expect(data, Mapping, "a figure shows a dataset or the path of its file")
+        return Data.of(data)
     path = Path(data)
     if path.suffix == ".zarr":
         from surfacechem.results import store

@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.errors import InputError, Place
+from surfacechem.errors import InputError, Place, expect
 from surfacechem.tolerances import CONTROL_RTOL, LOOSEST_RTOL, MAX_RTOL, MIN_RTOL
 
 Array = NDArray[np.float64]
@@ -35,6 +36,7 @@ NOTHING_EVOLVES = "nothing evolves, and no work is done"
 
 def check_tolerance(rtol: float, option: str) -> None:
     """Raise InputError for a relative tolerance out of the range of runs: tighter ones are below roundoff."""
+    expect(rtol, Real, "a tolerance is a number", Place(path=option))
     if not MIN_RTOL <= rtol <= MAX_RTOL:
         raise InputError(f"{rtol:g} is outside its range: >= {MIN_RTOL:g} and <= {MAX_RTOL:g}.", Place(path=option))
 

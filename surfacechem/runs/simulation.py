@@ -15,7 +15,7 @@ from surfacechem import format as cases
 from surfacechem.contracts.units import parse
 from surfacechem.documents.document import OVERRIDE, assignments, from_plain, overridden, parameter_path
 from surfacechem.documents.document import parse as parse_document
-from surfacechem.errors import PATHS, InputError, Place, concise, suggestion
+from surfacechem.errors import PATHS, InputError, Place, concise, expect, suggestion
 from surfacechem.format import Case, Overrides, Source
 from surfacechem.model.assemble import perturbed
 from surfacechem.model.system import System
@@ -254,7 +254,7 @@ class Simulation:
         InputError
             Where there is no parameter of a path, or a value is outside its range.
         """
-        settings = run or self.case.run
+        settings = self._settings(run)
         check_source(error, settings)  # before anything is computed
         if self.case.scene.surface is not None:
             self.case.refuse_nothing()
@@ -275,6 +275,13 @@ class Simulation:
             error_from=error,
             **chosen._origin(values),
         )
+
+    def _settings(self, run: Run | None) -> Run:
+        """Return the settings of a run from Python, by default those of the case."""
+        if run is None:
+            return self.case.run
+        expect(run, Run, "run is a Run, such as `dataclasses.replace(simulation.case.run, rtol=1e-8)`")
+        return run
 
     def _judged(
         self, trajectory: Trajectory, unused: str, option: str, estimate: Accuracy | None, errors: list[CellErrors]
@@ -475,7 +482,7 @@ class Simulation:
         freed, values = self._ready(changes or {}, plan)
         if freed is not self:
             return freed.sweep_plan(plan, values, threads, run)
-        settings = run or self.case.run
+        settings = self._settings(run)
         chosen, done, errors = self._resolved(settings, values, plan, threads)
         model = done[0].model
         taken = model.chosen(settings, done[0].values)
@@ -524,8 +531,10 @@ class Simulation:
         InputError
             If the store exists already, belongs to another plan, or cannot hold what is asked for.
         """
+        from surfacechem.format.plans import Plan
         from surfacechem.runs import streaming
 
+        expect(plan, Plan, "a store needs a plan, as `plan` of the simulation returns it")
         freed, values = self._ready(changes or {}, plan)
         if freed is not self:
             return freed.stream(plan, path, values, resume=resume, part=part)

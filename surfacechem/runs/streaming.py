@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -45,14 +44,6 @@ RUNS_OF_A_PIECE = 2**14
 """Largest number of runs that a thread takes at a time; with far fewer, calls of NumPy and waiting threads cost time,
 with far more, arrays leave the cache.
 """
-
-
-def processors() -> int:
-    """Return the number of processors that this process may use: fewer than there are for a job on a shared machine."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not every system reports it
-        return os.cpu_count() or 1
 
 
 class ChunkRuns:
@@ -228,7 +219,7 @@ class Stream:
         """Compute the missing chunks and store them. With the ``client`` of a dask.distributed cluster its workers
         compute, while this process writes.
         """
-        layout = self.store.layout
+        layout, threads = self.store.layout, sweeps.processors(threads)
         with self.store.locked(f"{self.part[0]}-of-{self.part[1]}"):
             if self.resumed:
                 self.store.restore()
@@ -237,7 +228,7 @@ class Stream:
             runs, resumed = layout.runs_of(numbers), layout.runs_of(set(numbers) - set(missing))
             done, failed = resumed, 0
             on_progress(Progress(runs, done, failed, resumed))
-            for number, futures in self._computed(missing, threads or processors(), client):
+            for number, futures in self._computed(missing, threads, client):
                 parts = []
                 for future in futures:
                     parts.append(columns := future.result())
@@ -246,7 +237,7 @@ class Stream:
                     on_progress(Progress(runs, done, failed, resumed))
                 # Only this thread writes, so that chunks and their marks are written in order.
                 columns = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
-                self.store.write(number, columns, threads or processors())
+                self.store.write(number, columns, threads)
         return self.store
 
     def check(self, threads: int | None = None) -> Checked | None:
@@ -313,8 +304,11 @@ def stream(
     part: tuple[int, int] = (1, 1),
 ) -> Stream:
     """Prepare a sweep into a store, which is created, or opened to be continued."""
-    if part[0] not in range(1, part[1] + 1):
-        raise InputError(f"{part[0]} of {part[1]} is no part; the first of 16 is (1, 16).", Place(path="part"))
+    match part:
+        case (int(k), int(parts)) if 1 <= k <= parts:
+            pass
+        case _:
+            raise InputError(f"{part} is no part; the first of 16 is (1, 16).", Place(path="part"))
     target, case = store_path(path), simulation.case
     section = case.sweep or SweepSection()
     keep = keep_of(section.keep, sweeps.prepared(simulation.system, plan))

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -94,6 +95,20 @@ def prepared(system: System, plan: Plan) -> System:
     return replace(found, origin=partial(prepared, system, plan))
 
 
+def processors(threads: int | None = None) -> int:
+    """Return how many threads are asked for; by default the number of processors that this process may use, which are
+    fewer than there are for a job on a shared machine.
+    """
+    if threads is not None:
+        if not (isinstance(threads, Integral) and threads > 0):
+            raise InputError(f"a number of threads is 1 or more, not {threads!r}.", path="threads")
+        return int(threads)
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not every system reports it
+        return os.cpu_count() or 1
+
+
 def solve(
     model: Model, plan: Plan, run: Run, changes: Mapping[str, float], threads: int | None = None
 ) -> list[Trajectory]:
@@ -119,7 +134,7 @@ def solve(
         log.info("runs", extra={"done": start, "total": len(pairs)})
         portion = pairs[start : start + RUNS_AT_A_TIME]
         try:
-            done += model.solve_all(portion, threads or os.cpu_count() or 1)
+            done += model.solve_all(portion, processors(threads))
         except InputError:
             for pair, point in zip(portion, plan.points[start:], strict=False):
                 with _told(plan, point):
@@ -137,7 +152,7 @@ def following(model: Model, plan: Plan, run: Run, changes: Mapping[str, float], 
     some = plan.picked(np.arange(0, plan.size, -(-plan.size // MOST_FOLLOWED)))
     try:
         pairs = [(run, model.values({**changes, **point})) for point in some.points]
-        done = model.solve_all(pairs, threads or os.cpu_count() or 1)
+        done = model.solve_all(pairs, processors(threads))
     except InputError:
         return run  # refused runs are reported when all runs are solved
     return replace(run, times=shared_times(done, max(len(run.times), MOST_OUTPUTS // plan.size)))
@@ -277,7 +292,7 @@ def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
         (replace(own, accounts=own.accounts or integrals), run.values)
         for own, run in zip(settings, done.runs, strict=True)
     ]
-    runs = done.model.solve_all(pairs, threads or os.cpu_count() or 1)
+    runs = done.model.solve_all(pairs, processors(threads))
     return replace(done, run=done.run.second(second_tolerance(done.run.rtol)), runs=runs)
 
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 import logging
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
 
-from surfacechem.errors import InputError, Place, refuse_unknown
+from surfacechem.errors import InputError, Place, expect, refuse_unknown
 from surfacechem.results.accuracy import check_tolerance
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Counters
@@ -121,11 +121,13 @@ def check_options(
     either; ``options`` names the three.
     """
     refuse_unknown(solvers, names, "no solver '{}'", Place(path=options[0]))
+    expect(tolerances, Collection, "tolerances are a list", Place(path=options[1]))
     for rtol in tolerances:
         check_tolerance(rtol, options[1])
     for given, option in zip((solvers, tolerances), options, strict=False):
         if not given:
             raise InputError("at least one is needed.", Place(path=option))
     low, high = bounds
+    expect(rounds, int, "rounds are a whole number", Place(path=options[2]))
     if not low <= rounds <= high:
         raise InputError(f"{rounds} is outside its range: >= {low} and <= {high}.", Place(path=options[2]))

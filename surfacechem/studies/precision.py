@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, count
@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from surfacechem.documents.document import as_texts
-from surfacechem.errors import InputError, Place, refuse_unknown
+from surfacechem.errors import InputError, Place, expect, refuse_unknown
 from surfacechem.format import Case
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import errors_over_time
@@ -395,6 +395,7 @@ def precision(
     """
     check_options(solvers, tolerances, repeat, (1, MOST_REPEAT), ("solvers", "tolerances", "repeat"))
     cases = [cases] if isinstance(cases, str | Path) else cases
+    expect(cases, Collection, "cases are names or files", Place(path="cases"))
     subjects = _subjects(cases, overrides, variables)
     tolerances = sorted(set(map(float, tolerances)), reverse=True)
     solvers, variables = tuple(dict.fromkeys(solvers)), tuple(dict.fromkeys(variables))

@@ -16,8 +16,10 @@ from ruamel.yaml import YAML
 import surfacechem
 from surfacechem import documents
 from surfacechem.errors import InputError
+from surfacechem.plots import figure
 from surfacechem.results.error_estimates import accuracy
 from surfacechem.runs import rerun
+from surfacechem.studies.stability import stability
 
 pytestmark = pytest.mark.around
 
@@ -55,6 +57,9 @@ def test_a_changed_run_can_be_run_again_from_its_file(simulation, tmp_path):
         ({"phi_max": 5.0}, r"no parameter 'phi_max' to change"),
         ({"initial.phi": 1.5}, r"at the start phi rose above its bound 1"),
         ({"initial.T": 300, "initial.T.level": 310}, "a parameter is given twice, with and without the key of its"),
+        (3, "override: changes are texts `path=value`, or values by path, not int"),
+        ([3], "changes are texts `path=value`, or values by path, not int"),
+        ({3: 4}, "changes are texts `path=value`, or values by path, not int"),
         (["bodies.lower.C=-1"], r"bodies\.lower\.C = -1 is outside its range: > 0"),
     ],
 )
@@ -206,6 +211,28 @@ def test_a_case_is_a_path_a_text_a_mapping_or_an_open_file(tmp_path):
 def test_what_is_no_case_is_refused(source, message):
     with pytest.raises(InputError, match=message):
         surfacechem.load(source)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda case: case.run(run={}), "run is a Run, .*, not dict"),
+        (lambda case: case.sweep({"initial.T": [300]}, threads=-1), "a number of threads is 1 or more, not -1"),
+        (lambda case: case.sweep({"initial.T": [300]}, threads="2"), "a number of threads is 1 or more, not '2'"),
+        (lambda case: case.sweep({"initial.T": [300]}, until=3), "changes are texts `path=value`, .*, not int"),
+        (lambda case: case.stream({"initial.T": [300]}, "o.zarr"), "a store needs a plan, .*, not dict"),
+        (lambda case: figure(case), "a figure shows a dataset or the path of its file, not Simulation"),
+        (lambda _: surfacechem.load("exothermic", 3), "changes are texts `path=value`, .*, not int"),
+        (lambda _: surfacechem.precision(3), "cases are names or files, not int"),
+        (lambda _: surfacechem.precision("exothermic", tolerances=1e-5), "tolerances are a list, not float"),
+        (lambda _: surfacechem.precision("exothermic", tolerances=["a"]), "a tolerance is a number, not str"),
+        (lambda _: surfacechem.precision("exothermic", repeat="a"), "rounds are a whole number, not str"),
+        (lambda _: stability(["endothermic"]), r"no regime '\['endothermic'\]'"),
+    ],
+)
+def test_what_is_of_no_use_is_refused_before_anything_runs(simulation, call, message):
+    with pytest.raises(InputError, match=message):
+        call(simulation)
 
 
 def test_a_dataset_is_a_table_by_its_suffix(simulation, tmp_path):

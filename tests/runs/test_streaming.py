@@ -383,8 +383,8 @@ def test_another_sweep_or_what_is_no_store_is_refused(whole, tmp_path):
     (tmp_path / "foreign.zarr" / "zarr.json").write_text("{}")
     with pytest.raises(InputError, match="is no store of a sweep"):
         stored(tmp_path / "foreign.zarr", resume=True)
-    for part in ((0, 4), (5, 4), (1, 0), (1.5, 3)):
-        with pytest.raises(InputError, match=r"of \d is no part; the first of 16 is \(1, 16\)"):
+    for part in ((0, 4), (5, 4), (1, 0), (1.5, 3), 3):
+        with pytest.raises(InputError, match=r"is no part; the first of 16 is \(1, 16\)"):
             stored(tmp_path / "o.zarr", part=part)
     with pytest.raises(InputError, match="there is no folder"):
         stored(tmp_path / "no" / "o.zarr")
