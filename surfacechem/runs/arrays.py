@@ -6,7 +6,7 @@ that could not go on) are solved one by one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -21,7 +21,7 @@ from surfacechem.model.system import System
 from surfacechem.results.audit import LAST_DIGITS, residuals, resolved
 from surfacechem.results.store import CHUNK_BYTES
 from surfacechem.runs import spectrum
-from surfacechem.runs.keeping import REACHES, STATUSES, Columns, Keep, crossed, reason_table, variable
+from surfacechem.runs.keeping import REACHES, STATUSES, Columns, Keep, begins, crossed, reason_table, variable
 from surfacechem.solve import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Array, Index, Mask, Problem, Status
 from surfacechem.solve.diagnose import are_led_back
@@ -163,7 +163,8 @@ class ArrayRuns:
         self.no_peaks = peaks_before(self.problem)[None]
         """Largest accounts and guards before any evaluation."""
         times = self.problem.times
-        self.shape = times if self.keeps_extremes or keep.series else times[[0, -1]][: 2 * keep.balances]
+        ends = 2 * max(keep.balances, bool(keep.reach))
+        self.shape = times if self.keeps_extremes or keep.series else times[[0, -1]][:ends]
         """Output times of a run of the case: all, or the first and the last, or none."""
         self.keeps_course = bool(len(self.shape))
         """True if more is kept than ends and events."""
@@ -566,15 +567,25 @@ class ArrayRuns:
             columns[column] = rows[:, 1]
             for state in keep.at_events if name in keep.events else ():
                 columns[f"{state}_at_{variable(name)}"] = rows[:, 2 + self.model.system.state_columns[state]]
-        if keep.reach:
-            leaps = self._discontinuities(found)
-            for name, level in keep.reach.items():
-                first, leapt = np.full(len(recorded), np.inf), crossed(leaps.before[name], leaps.after[name], level)
-                np.minimum.at(first, leaps.owner[leapt], leaps.t[leapt])
-                columns[f"time_to_{name}"] = np.fmin(
-                    columns[f"time_to_{name}"], np.where(first < np.inf, first, np.nan)
-                )
+        for name, t in self._reached_otherwise(found, named) if keep.reach else ():
+            columns[f"time_to_{name}"] = np.fmin(columns[f"time_to_{name}"], np.where(t < np.inf, t, np.nan))
         return columns
+
+    def _reached_otherwise(self, found: Ends, named: Sequence[str]) -> Iterator[tuple[str, Array]]:
+        """Yield each variable of which values are reached, and when a jump reaches them, or the start; else infinity.
+
+        The names are those of margins and edges.
+        """
+        leaps, starts = self._discontinuities(found), found.batch.outputs[:, 0, : self.n]
+        rows = found.inputs(np.arange(len(starts)), np.zeros(len(starts)), starts, np.zeros_like(starts))
+        put_rates(self.model.program, rows)
+        assert self.model.program.margins is not None
+        distances = self.model.program.margins(rows)
+        for name, level in (self.keep.reach or {}).items():
+            first, leapt = np.full(len(starts), np.inf), crossed(leaps.before[name], leaps.after[name], level)
+            np.minimum.at(first, leaps.owner[leapt], leaps.t[leapt])
+            first[begins(distances[:, named.index(f"{REACHES}{name}")], level)] = 0.0
+            yield name, first
 
 
 class JumpingRuns(ArrayRuns):

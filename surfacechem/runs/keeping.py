@@ -20,6 +20,7 @@ from surfacechem.solve.contract import REASONS, Status
 from surfacechem.solve.diagnose import GROWS, RUNS_AWAY
 from surfacechem.solve.radau.solver import put_rates
 from surfacechem.solve.run import Model, Trajectory
+from surfacechem.tolerances import GUARD_EPS
 
 Columns = dict[str, NDArray[Any]]
 """Kept columns by name; the first axis is the run."""
@@ -197,6 +198,12 @@ def crossed(before: NDArray[Any], after: NDArray[Any], level: float) -> NDArray[
     return ((before < level) & (after >= level)) | ((before > level) & (after <= level))
 
 
+def begins(distance: NDArray[Any], level: float) -> NDArray[np.bool_]:
+    """True where a quantity at this distance from a level is on it at the start, but for roundoff."""
+    found: NDArray[np.bool_] = np.abs(distance) <= GUARD_EPS * abs(level)
+    return found
+
+
 class RunByRun:
     """Columns of runs that are solved and evaluated one after the other: any scene, any end."""
 
@@ -251,8 +258,8 @@ class RunByRun:
                 row[f"time_{name}"] = event.t
                 row |= {f"{state}_at_{name}": event.before[columns[state]] for state in self.keep.at_events}
         for name, level in (self.keep.reach or {}).items():
-            where = np.flatnonzero(crossed(run.discontinuities.before[name], run.discontinuities.after[name], level))
-            if len(where):
-                column = f"time_to_{name}"
-                row[column] = min(row.get(column, np.inf), float(run.discontinuities.t[where[0]]))
+            at, leaps, column = run.column(name)[0], run.discontinuities, f"time_to_{name}"
+            leapt = leaps.t[crossed(leaps.before[name], leaps.after[name], level)]
+            if len(times := [*np.zeros(1)[begins(at[:1] - level, level)], *leapt]):
+                row[column] = min(row.get(column, np.inf), float(times[0]))
         return row

@@ -207,6 +207,17 @@ def test_levels_and_extremes_are_met_in_jumps_too(name, path, keep, level, tmp_p
     assert found[f"{level}_max"].item() >= (1 - 1e-9) * jump.after.y[j]
 
 
+@pytest.mark.parametrize("more", [{}, {"run.max-seconds": 1000}])
+def test_a_run_that_begins_at_a_value_has_reached_it(more, tmp_path):
+    """In arrays and one run at a time; one that begins beyond it has not come to it."""
+    keep, over = {"reach": {"phi": 0.5, "T": "26.85 degC"}, "balances": "none"}, {"initial.phi": [0.1, 0.5, 0.7]}
+    simulation = surfacechem.load("exothermic", {"sweep": {"over": over, "keep": keep}, **more})
+    found = stored(tmp_path / "s.zarr", simulation).dataset
+    assert found["time_to_T"].values.tolist() == [0.0, 0.0, 0.0]
+    assert found["time_to_phi"].values[1:].tolist() == pytest.approx([0.0, np.nan], nan_ok=True)
+    assert 0 < found["time_to_phi"].values[0] < 1
+
+
 STEPPED = """
 T_0: 300 K
 bodies:
