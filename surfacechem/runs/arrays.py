@@ -41,6 +41,9 @@ FIRST_RUNS = 100
 """Runs of a plan among which an admissible one is searched for, whose problem the others share."""
 
 
+LARGEST_FREED = 31 * 2**20
+"""Size of a freed block [bytes] that the C library of Linux takes as the largest of usual ones; at most 32 MB."""
+
 Values = tuple[Array, dict[str, Array]]
 """States and named quantities at rows of arguments: the table of all of them, and its columns by name."""
 
@@ -69,7 +72,9 @@ class Ends:
         if self.segments.shape[1] > 2:
             breaks = self.segments[np.minimum(owner, len(self.segments) - 1), 1:-1]
             segment = (t[:, None] >= breaks if after else t[:, None] > breaks).sum(axis=1)
-        return np.concatenate([t[:, None], y, ydot, self.table[owner, segment]], axis=1)
+        count, width = self.table.shape[1:]
+        parameters = self.table.reshape(-1, width).take(owner * count + segment, axis=0)
+        return np.concatenate([t[:, None], y, ydot, parameters], axis=1)
 
 
 def is_array(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
@@ -115,6 +120,18 @@ def all_above(table: Array, least: float, columns: Sequence[int] | Index) -> Mas
     return found
 
 
+def keep_memory() -> None:
+    """Make the C library keep the memory of arrays that are freed, for those of the next runs.
+
+    Else it returns that of large ones to the system, which clears each page anew before it is written to again; that
+    takes longer than the arithmetic. What counts as large follows from the largest block that was ever freed. No page
+    of this one is written to, so that it takes no memory.
+
+    Source: mallopt(3), M_MMAP_THRESHOLD.
+    """
+    np.empty(LARGEST_FREED, np.uint8)
+
+
 def _starts_as_given(system: System, swept: set[str]) -> bool:
     """True if states start at given values or their logarithms, or are found from them, and no register is."""
     made = [state for state in system.states if state.given is not None and state.given.state and state.path in swept]
@@ -138,6 +155,7 @@ class ArrayRuns:
         """Prepare the runs; ``automatic`` is True if their solver was chosen for them. One that is named gives the
         results of single runs, to the last bit.
         """
+        keep_memory()
         self.model, self.plan, self.run, self.keep = model, plan, run, keep
         self.values = model.values(changes)
         # Implicit steps in lanes are for stiffness, of all runs or of those that turn stiff; the other reasons for
