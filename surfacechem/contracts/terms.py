@@ -183,6 +183,11 @@ class Law(ABC):
         """Values of variables at which the formula has a kink, so that a step has to end there."""
         return {}
 
+    @classmethod
+    def is_stated(cls) -> bool:
+        """True if a class has its formula; a common base of several laws has none."""
+        return hasattr(cls, cls.formula) and not inspect.isabstract(cls)
+
     @property
     def statement(self) -> Callable[..., Expression]:
         """The bound method that states the law."""

@@ -46,7 +46,7 @@ def module(family: str) -> ModuleType:
 def _stated_in(found: ModuleType, contract: type[Law]) -> Iterator[type[Law]]:
     for value in vars(found).values():
         own = inspect.isclass(value) and value.__module__ == found.__name__
-        if own and issubclass(value, contract) and not inspect.isabstract(value):
+        if own and issubclass(value, contract) and value.is_stated():
             yield value
 
 
@@ -119,7 +119,7 @@ def register(law: L) -> L:
 def check_own(law: type[Law]) -> None:
     """Raise InputError unless a class is a law of some contract, with a name that no law of the package has."""
     contracts = [contract for contract in FAMILIES if contract in getattr(law, "__mro__", ())]
-    if not contracts or inspect.isabstract(law):
+    if not contracts or not law.is_stated():
         known = ", ".join(contract.__name__ for contract in FAMILIES)
         raise InputError(f"{getattr(law, '__name__', law)} is no law: a law is a subclass of one of {known}.")
     for contract in contracts:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from surfacechem.contracts.terms import (
     FilmGrowth,
@@ -160,10 +159,6 @@ class ActivatedGrowth(FilmGrowth):
     G_0: float = parameter("m/s", "growth rate without a barrier", at_least=0)
     E: float = parameter("J", "activation energy without stress", at_least=0)
     V: float = parameter("m^3", "activation volume", at_least=0)
-
-    @abstractmethod
-    def rate(self, *_: Any, **__: Any) -> Expression:
-        """Growth rate [m/s]."""
 
     def under(self, stress: Expression, T_c: Expression) -> Expression:
         """Growth rate [m/s] under a stress [Pa]."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from surfacechem.contracts.terms import HeatTransfer, UnderPressure, option, parameter
 from surfacechem.errors import InputError
@@ -176,10 +175,6 @@ class ConductanceTable(HeatTransfer):
         if any(b <= a for a, b in pairwise(at)):
             raise InputError(f"{of} of a table must increase from each to the next.")
 
-    @abstractmethod
-    def conductance(self, *_: Any, **__: Any) -> Expression:
-        """Conductance [W/(m^2 K)]."""
-
     @property
     def _at(self) -> Sequence[float]:
         found: Sequence[float] = getattr(self, self.points)
@@ -308,10 +303,6 @@ class Conforming(UnderPressure, HeatTransfer):
     k: float = parameter("W/(m K)", "harmonic mean of the conductivities, 2 k_1 k_2 / (k_1 + k_2)", above=0)
     m: float = parameter("1", "mean absolute slope of the asperities, sqrt(m_1^2 + m_2^2)", above=0)
     sigma: float = parameter("m", "rms roughness, sqrt(sigma_1^2 + sigma_2^2)", above=0)
-
-    @abstractmethod
-    def conductance(self, p: Expression) -> Expression:
-        """Conductance [W/(m^2 K)] under a pressure."""
 
 
 class CooperMikicYovanovich(Conforming):

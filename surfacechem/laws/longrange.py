@@ -144,10 +144,6 @@ class LennardJonesDerjaguin(LennardJonesSpherePlane):
 class Attraction(Potential):
     """A potential without repulsion, at any distance."""
 
-    @abstractmethod
-    def energy(self, g_n: Expression) -> Expression:
-        """Free energy [J/m^2]."""
-
     def repulsion(self) -> Expression:
         """Energy of the repulsion: zero."""
         return 0.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
@@ -212,10 +211,6 @@ class SurfaceOfRevolution(Shape):
         angle, radius = np.arctan2(x[:, 1], x[:, 0]), np.hypot(x[:, 0], x[:, 1])
         starts = np.stack([radius, angle, radius, angle + math.pi], axis=-1).reshape(-1, 2)
         return np.repeat(np.arange(len(x)), 2), starts
-
-    @abstractmethod
-    def point(self, u: Expression, v: Expression) -> Point:
-        """Return the point at the distance u from the axis and the angle v about it."""
 
 
 class Disc(SurfaceOfRevolution):

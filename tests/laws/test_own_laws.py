@@ -117,8 +117,9 @@ def test_a_law_is_registered(folder, monkeypatch):
         surfacechem.load(text)
     assert surfacechem.register(law) is law
     assert surfacechem.load(text).case.scene.interface.frictions[0].eta == 2e7
-    with pytest.raises(InputError, match="int is no law"):
-        surfacechem.register(int)
+    for other in (int, type("Unstated", (Friction,), {})):
+        with pytest.raises(InputError, match=f"{other.__name__} is no law"):
+            surfacechem.register(other)
 
 
 @pytest.fixture
