@@ -475,17 +475,15 @@ def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
     ]
 
 
-def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
-    """Return warnings about laws whose rate exceeded exp(EXPONENT_CAP) at one of the states."""
-    found = []
+def _capped_rates(system: System, rows: NDArray[np.float64]) -> Iterator[str]:
+    """Yield warnings about laws whose rate exceeded exp(EXPONENT_CAP) at one of the states."""
     for law, exponents in system.capped_laws if len(rows) else ():
         largest = float(np.nanmax(exponents(rows), initial=-np.inf))
         if largest > EXPONENT_CAP:
-            found.append(
+            yield (
                 f"{law.title}: the logarithm of its rate coefficient (SI) reached {largest:.4g}; above "
                 f"{EXPONENT_CAP:g} the rate goes on along its tangent: it is instantaneous, but not the one stated"
             )
-    return found
 
 
 def active_cautions(system: System, rows: NDArray[np.float64]) -> list[str]:

@@ -417,9 +417,7 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
         # If nothing evolves the errors of laws are the only ones.
         words = f"estimate: a second run {cells.source.removeprefix('and one ')}"
         return Accuracy(stated(cells.variables), words, cells.variables)
-    errors = dict(estimate.variables)
-    for name, error in cells.variables.items():
-        errors[name] = errors.get(name, 0.0) + error
+    errors = CellErrors(estimate.variables).added_to(cells).variables
     worst = max(estimate.error, stated(errors))
     source = f"{estimate.source}, {cells.source}"
     return replace(estimate, error=worst, variables=errors, source=source, named=dict)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -156,7 +156,7 @@ def entropy_destroyed(jumps: Sequence[Jump]) -> float:
     return max((-jump.entropy for jump in jumps if jump.verdict == VIOLATES and not jump.stops), default=0.0)
 
 
-def event_findings(jumps: Sequence[Jump], unit: str = "J/(m^2 K)") -> list[str]:
+def event_findings(jumps: Sequence[Jump], unit: str = "J/(m^2 K)") -> Iterator[str]:
     """Describe jumps that violate the second law and that the case did not accept; repeated ones in one line. ``unit``
     is the unit of entropy.
     """
@@ -164,26 +164,23 @@ def event_findings(jumps: Sequence[Jump], unit: str = "J/(m^2 K)") -> list[str]:
     for jump in jumps:
         if jump.verdict != ADMISSIBLE and jump.edge.violation != "accept":
             flagged.setdefault((jump.edge.reason, jump.verdict), []).append(jump)
-    findings = []
     for (reason, verdict), same in flagged.items():
         worst = min(same, key=lambda jump: jump.entropy)
         first, lost = f"t = {same[0].t:.9g} s", f"{worst.entropy:.3g} {unit}"
         if len(same) == 1:
-            findings.append(f"{reason} at {first}: {verdict} ({lost})")
+            yield f"{reason} at {first}: {verdict} ({lost})"
         else:
             times, at = f"{len(same)} times, first at {first}", f"t = {worst.t:.9g} s"
-            findings.append(f"{reason} {times}: {verdict} (at worst {lost}, at {at})")
-    return findings
+            yield f"{reason} {times}: {verdict} (at worst {lost}, at {at})"
 
 
-def event_waits(trajectory: Trajectory) -> list[str]:
+def event_waits(trajectory: Trajectory) -> Iterator[str]:
     """Describe transitions for which a run that reached its end was still waiting, except those that end with it."""
-    system, last, findings = trajectory.model.system, trajectory.jumps[-1:], []
+    system, last = trajectory.model.system, trajectory.jumps[-1:]
     for mode in system.modes:
         value = float(last[0].after.parameters[system.mode_columns[mode.name]]) if last else mode.initial
         if trajectory.status == "finished" and value in mode.waits and not _ends(trajectory, mode.symbol, value):
-            findings.append(f"the {mode.name} {mode.words[value]} did not end: it goes on until {mode.waits[value]}")
-    return findings
+            yield f"the {mode.name} {mode.words[value]} did not end: it goes on until {mode.waits[value]}"
 
 
 def _ends(trajectory: Trajectory, mode: Any, value: float) -> bool:

@@ -90,13 +90,12 @@ def exact_values(
     every = solution(np.concatenate([times, before_end, around.ravel()]))
     first = len(times) + len(before_end)
     exact = {each: values[: len(times)].copy() for each, values in every.items()}
-    _choose_sides(
-        exact,
-        {each: values[len(times) : first] for each, values in every.items()},
-        lambda t: solution(np.minimum(t, reference.end_time)),
-        run,
-        side,
-    )
+
+    def until_end(t: Array) -> dict[str, Array]:
+        return solution(np.minimum(t, reference.end_time))
+
+    near_end = {each: values[len(times) : first] for each, values in every.items()}
+    _choose_sides(exact, near_end, until_end, run, side)
     if reference.continuous:
         return _with_profiles(reference, exact, scene, run)
     for j, state in enumerate(run.model.system.states if tested else ()):
@@ -107,7 +106,7 @@ def exact_values(
     if probed:
         near = {each: values[first:].reshape(5, -1) for each, values in every.items()}
         _check_equations(near, run, probes, step)
-        _check_jumps(lambda t: solution(np.minimum(t, reference.end_time)), run, side)
+        _check_jumps(until_end, run, side)
     return exact
 
 
