@@ -286,20 +286,16 @@ def mechanism_sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
         text = f"{kind.kind}: {source(kind)}".replace("``", "")
         types += textwrap.wrap(text, TEXT_WIDTH - 2, subsequent_indent="    ", break_on_hyphens=False)
     outside = [(law.label, law.equation, f"line {law.place.line}") for law in curves.evaluated if law.place]
-    cold, pulled = np.array([shown]), curves.pulled or "a bond"
+    pulled = curves.pulled or "a bond"
+    over_temperature = _table(curves, "T [K]", T, T, np.zeros(1)) if curves.laws else []
+    over_force = _table(curves, "f [pN]", f * 1e12, np.array([shown]), f) if curves.loaded else []
     sections = {
         f"Species at {shown:g} K, without force": columns(_species(curves, shown)),
         "Reactions": list(reaction_lines(curves, temperatures, forces)),
         "Reactions whose rates Cantera gives, under `solver: cantera`": columns(outside),
         "Cycles": columns((" ".join(cycle.labels), cycle_verdict(cycle, curves, *grid)) for cycle in cycles(curves)),
-        "Against temperature, without force; rates per bond at coverages of one": columns(
-            _table(curves, "T [K]", T, T, np.zeros(1))
-        )
-        if curves.laws
-        else [],
-        f"Against the force on {pulled}, at {shown:g} K": columns(_table(curves, "f [pN]", f * 1e12, cold, f))
-        if curves.loaded
-        else [],
+        "Against temperature, without force; rates per bond at coverages of one": columns(over_temperature),
+        f"Against the force on {pulled}, at {shown:g} K": columns(over_force),
         "Rate types": types,
         "Remarks": list(remarks(curves, temperatures)),
     }

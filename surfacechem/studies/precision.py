@@ -503,6 +503,7 @@ def _variables() -> Iterator[Variable]:
     for kind, text in MEANING.items():
         known, text = partial(ComparedCase.uncertainty, kind=kind), f"uncertainty of the reference: {text}"
         yield Variable(f"uncertainty_{kind}", ("case",), known, "1", text)
+    inside = "least time inside the library's own steps"
     of_point: list[tuple[str, str, str, Callable[[WorkPoint], float | str]]] = [
         ("status", "1", "finished, stopped, failed or omitted", lambda p: p.outcome),
         ("reason", "1", "why the run ended, failed or was left out", lambda p: p.reason),
@@ -511,12 +512,7 @@ def _variables() -> Iterator[Variable]:
         ("run_seconds", "s", "least run time", lambda p: min(p.seconds, default=math.nan)),
         ("run_seconds_median", "s", "median run time", lambda p: median(p.seconds or [math.nan])),
         ("run_seconds_max", "s", "longest run time", lambda p: max(p.seconds, default=math.nan)),
-        (
-            "stepping_seconds",
-            "s",
-            "least time inside the library's own steps",
-            lambda p: min(p.stepping, default=math.nan),
-        ),
+        ("stepping_seconds", "s", inside, lambda p: min(p.stepping, default=math.nan)),
         ("repetitions", "1", "number of timed runs", lambda p: float(len(p.seconds))),
         *((f"count_{name}", "1", text, partial(WorkPoint.count, name=name)) for name, text in COUNTS.items()),
     ]

@@ -385,6 +385,7 @@ def _variables(first: str) -> Iterator[Variable]:
     possible = "digits that rounding of the data leaves"
     largest = "-log10 of the largest relative error, of values or of the time of the end"
     came = f"what came of it: {', '.join(OUTCOMES)}"
+    why = "where the error is largest, or why the run ended"
     yield Variable("regime", ("regime",), lambda row: row.regime.name, "1", "regime")
     yield Variable("decade", ("decade",), float, "1", "number of the value, from mild to extreme")
     yield Variable("solver", ("solver",), str, "1", "solver")
@@ -397,9 +398,7 @@ def _variables(first: str) -> Iterator[Variable]:
     yield Variable("residuals", cell, at(lambda cell: cell.counters.residuals), "1", "evaluations of the equations")
     yield Variable("seconds", cell, at(lambda cell: sum(cell.seconds)), "s", "run time")
     yield Variable("outcome", cell, at(lambda cell: cell.outcome, ""), "1", came)
-    yield Variable(
-        "reason", cell, at(lambda cell: cell.reason, ""), "1", "where the error is largest, or why the run ended"
-    )
+    yield Variable("reason", cell, at(lambda cell: cell.reason, ""), "1", why)
 
 
 def _sections(

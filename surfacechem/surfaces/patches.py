@@ -220,12 +220,8 @@ class Patches:
         over = np.take_along_axis(heights, best[:, None, None, None], axis=-1)
         # Choose a direction in which each line of nodes crosses the level once.
         steps = [np.diff(over[..., 0], axis=k + 1) for k in range(2)]
-        turns = np.stack(
-            [
-                np.any((step.min(axis=k + 1) < -self.noise) & (step.max(axis=k + 1) > self.noise), axis=1)
-                for k, step in enumerate(steps)
-            ]
-        )
+        ends = [(step.min(axis=k + 1), step.max(axis=k + 1)) for k, step in enumerate(steps)]
+        turns = np.stack([np.any((low < -self.noise) & (high > self.noise), axis=1) for low, high in ends])
         steepness = np.stack([np.abs(step).mean(axis=(1, 2)) for step in steps])
         along = np.argmax(np.where(np.array(self.uniform)[:, None], -1.0, np.where(turns, 0.0, steepness)), axis=0)
         # Two edges never coincide; where a gap jumps its level is on the edge. Far from the body edges do not matter.

@@ -140,31 +140,26 @@ def _per_current_area(build: Build, amount: Expression) -> Expression:
 
 
 def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit: float) -> Bond:
-    name = quantity.name
-    initial = _initial_bonding(build, name)
+    name, given = quantity.name, build.scene.initial
+    if name != "phi" or LN_PHI not in given:
+        initial = build.initial(name)
+    elif "phi" in given:
+        message = f"phi has two roles: given by itself and by {LN_PHI}. Remove one of them."
+        raise InputError(message, path="initial.phi")
+    elif given[LN_PHI] < math.log(math.ulp(0.0)):
+        message = f"{LN_PHI} = {given[LN_PHI]:g} is no bonding state that a number can hold."
+        raise InputError(message, path=f"initial.{LN_PHI}")
+    else:
+        initial = math.exp(given[LN_PHI])
     if not 0 <= initial <= limit:
         raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.", path=f"initial.{name}")
     state = State(quantity, initial, 1.0)
     build.variables.define(name, state.symbol, "evolved", "bonding")
-    start, fixed = Spec("1", f"initial {name}"), name not in build.scene.initial
+    start, fixed = Spec("1", f"initial {name}"), name not in given
     first = build.constant(f"{name}_i", f"initial.{name}", start, initial, internal=fixed)
     build.add(state)
     _bounds(build, name, state.symbol, limit)
     return Bond(state.symbol, state.dot, density, first)
-
-
-def _initial_bonding(build: Build, name: str) -> float:
-    """Return the initial value of a bonding variable, from its logarithm if that is given."""
-    initial = build.scene.initial
-    if name != "phi" or LN_PHI not in initial:
-        return build.initial(name)
-    if "phi" in initial:
-        message = f"phi has two roles: given by itself and by {LN_PHI}. Remove one of them."
-        raise InputError(message, path="initial.phi")
-    if initial[LN_PHI] < math.log(math.ulp(0.0)):
-        message = f"{LN_PHI} = {initial[LN_PHI]:g} is no bonding state that a number can hold."
-        raise InputError(message, path=f"initial.{LN_PHI}")
-    return math.exp(initial[LN_PHI])
 
 
 def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
