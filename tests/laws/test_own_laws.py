@@ -33,6 +33,7 @@ class Slime(Friction):
     """
 
     eta: float = parameter("Pa s/m", "resistance", at_least=0)
+    ranges = {"v": (0.0, 1e-3)}
 
     def traction(self, v):
         return self.eta * v
@@ -68,6 +69,7 @@ def folder(tmp_path, monkeypatch):
 def test_a_case_names_the_file_of_a_law(folder):
     solution = surfacechem.run("slime.yaml")
     assert float(solution.dataset["T"][-1]) == pytest.approx(T_END, rel=1e-9)
+    assert solution.warnings[0].startswith("slime is an extrapolation: v ran from 0.01 to 0.01")
     assert "slime" not in laws.laws(Friction)  # no other case knows it
 
 
