@@ -171,10 +171,8 @@ def file_in(folder: Path, name: str, place: Place) -> Path | None:
     if not is_file(path):
         return None
     if place.file != OVERRIDE and not path.resolve().is_relative_to(folder.resolve()):
-        message = (
-            f"{name} lies outside the folder of the case. Put it there, or name it yourself: --set {place.path}=..."
-        )
-        raise InputError(message, place)
+        remedy = f"Put it there, or name it yourself: --set {place.path}=..."
+        raise InputError(f"{name} lies outside the folder of the case. {remedy}", place)
     return path
 
 

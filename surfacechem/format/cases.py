@@ -65,10 +65,8 @@ def with_own_laws(tree: Tree, base: Path, allow_code: bool = False) -> tuple[Tre
         source = str(inside.value) if inside else document.read(document.named(fields["file"], base, "a file of laws"))
         checksum = hashlib.sha256(source.encode()).hexdigest()
         if inside and not allow_code and checksum not in _run:
-            raise inside.error(
-                f"the case carries code of its own, {name}, which runs only where you allow it: by `--allow-code`, or "
-                "`allow_code=True` in Python. Read it before."
-            )
+            allowed = "where you allow it: by `--allow-code`, or `allow_code=True` in Python. Read it before."
+            raise inside.error(f"the case carries code of its own, {name}, which runs only {allowed}")
         if "sha256" in fields and fields["sha256"].value != checksum:
             message = f'{name} is another file than the one meant: its checksum is `sha256: "{checksum}"`.'
             raise fields["sha256"].error(message)

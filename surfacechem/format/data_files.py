@@ -175,9 +175,8 @@ def from_csv(content: Tree) -> Numbers:
     along = sorted(set(x)), sorted(set(y))
     for place in product(*along):
         if place not in heights:
-            grid = (
-                f"on {len(along[0])} x {len(along[1])} places none is given at x = {place[0]:g} m, y = {place[1]:g} m"
-            )
+            hole = f"none is given at x = {place[0]:g} m, y = {place[1]:g} m"
+            grid = f"on {len(along[0])} x {len(along[1])} places {hole}"
             raise InputError(f"the heights have holes: {grid}.", content.place)
     return {"x": along[0], "y": along[1], "z": [heights[place] for place in product(*along)]}
 

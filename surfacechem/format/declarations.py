@@ -274,11 +274,8 @@ class OneLaw(Content):
         elif isinstance(tree.value, str) and tree.value:
             law, parameters = tree.value, Tree(None, tree.place)
         else:
-            given = (
-                f"several: {', '.join(map(str, tree.value))}"
-                if isinstance(tree.value, dict) and tree.value
-                else tree.shown
-            )
+            several = ", ".join(map(str, tree.value)) if isinstance(tree.value, dict) else ""
+            given = f"several: {several}" if several else tree.shown
             raise tree.error(f"a law is one entry, `name: {{parameters}}`, not {given}.")
         with placed(tree.place):
             found = laws.find(self.contract, law)

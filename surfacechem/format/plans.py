@@ -567,9 +567,8 @@ def _distribution(path: str, tree: Tree, unit: str) -> Distribution:
     section = read(DistributionSection, tree, Context(x=unit))
     given = {name: kind for name, kind in section.values.items() if kind is not None}
     if len(given) != 1:
-        raise tree.error(
-            "a distribution is one of uniform, normal, lognormal and table, `normal: {mean: ..., std: ...}`."
-        )
+        kinds = "uniform, normal, lognormal and table"
+        raise tree.error(f"a distribution is one of {kinds}, `normal: {{mean: ..., std: ...}}`.")
     ((name, kind),) = given.items()
     if isinstance(kind, TableSection):
         return _column(kind, path, unit)

@@ -117,10 +117,8 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
 def _refuse(top: Mapping[str, Tree], bodies: Mapping[str, Tree], interface: Mapping[str, Tree]) -> None:
     """Raise InputError if bodies are not two, or cannot have their names, or curved ones bond or rub as flats do."""
     if "bodies" in top and len(bodies) != 2:
-        message = (
-            f"exactly two bodies are needed, not {len(bodies)} ({listed([*bodies]) or 'none'}); the first is body 1."
-        )
-        raise top["bodies"].error(message)
+        given = f"{len(bodies)} ({listed([*bodies]) or 'none'})"
+        raise top["bodies"].error(f"exactly two bodies are needed, not {given}; the first is body 1.")
     for name, body in bodies.items():
         if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
             raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")
@@ -257,9 +255,8 @@ def _surface(case: Document) -> CurvedSurfaces | None:
         raise section.error(f"{text}: leave one of the two out.", "laws")
     low, high = section.approach.low, section.approach.high
     if not low < high:
-        raise section.approach.error(
-            f"the least approach {low:g} m must be below the largest, {high:g} m.", "from", "to"
-        )
+        message = f"the least approach {low:g} m must be below the largest, {high:g} m."
+        raise section.approach.error(message, "from", "to")
     _refuse_outside(case, low, high)
     return CurvedSurfaces(
         shapes=(section.bodies[first], section.bodies[second]),
@@ -494,9 +491,8 @@ def run_of(section: RunSection) -> Run:
         raise section.error("the tolerance has two roles: give `accuracy` or `rtol`.", "accuracy", "rtol")
     solver = section.solver or (solvers.AUTO if section.accuracy is not None else OWN)
     if section.solver == solvers.AUTO and section.has("rtol"):
-        raise section.error(
-            "the tolerance has two roles: with `solver: auto` it follows from `accuracy`.", "rtol", "solver"
-        )
+        message = "the tolerance has two roles: with `solver: auto` it follows from `accuracy`."
+        raise section.error(message, "rtol", "solver")
     # The first tolerance for an accuracy has a margin; `solver: auto` repeats a run that misses it at a tighter one.
     usual = DEFAULT_RTOL if section.accuracy is None else first_tolerance(section.accuracy)
     return Run(

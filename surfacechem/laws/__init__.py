@@ -124,9 +124,8 @@ def check_own(law: type[Law]) -> None:
         raise InputError(f"{getattr(law, '__name__', law)} is no law: a law is a subclass of one of {known}.")
     for contract in contracts:
         if law.name() in _shipped(contract):
-            raise InputError(
-                f"{law.__name__} has the name of the {contract.contract} law '{law.name()}' of the package."
-            )
+            taken = f"the {contract.contract} law '{law.name()}' of the package"
+            raise InputError(f"{law.__name__} has the name of {taken}.")
 
 
 def laws_of_module(found: ModuleType) -> list[type[Law]]:

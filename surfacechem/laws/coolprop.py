@@ -98,20 +98,18 @@ class CoolPropFluid(Fluid):
         """Remark on the cost of a mixture without saturation at its pressure, so that its phase is unknown."""
         if len(self.name.split("&")) == 1 or any(_limits(self)[2:]):
             return ""
-        return (
-            f"{self.name} is a mixture, of which CoolProp needs some 20 to 50 ms for each value: each property takes "
-            "seconds to fit, once on a machine. Give the properties that matter as numbers where that is too long."
-        )
+        slow = f"{self.name} is a mixture, of which CoolProp needs some 20 to 50 ms for each value"
+        remedy = "Give the properties that matter as numbers where that is too long."
+        return f"{slow}: each property takes seconds to fit, once on a machine. {remedy}"
 
     def critical_remark(self) -> str:
         """Return advice if the critical pressure is so close that properties are not smooth; else empty."""
         critical = self._asked("Pcrit")
         if critical is None or abs(self.pressure / critical - 1) > CRITICAL_DISTANCE:
             return ""
-        return (
-            f" The critical pressure is {critical:.6g} Pa; within a tenth of it CoolProp's properties jump from "
-            "temperature to temperature. Give them as numbers under `interface.medium`, or another pressure."
-        )
+        jump = "within a tenth of it CoolProp's properties jump from temperature to temperature"
+        remedy = "Give them as numbers under `interface.medium`, or another pressure."
+        return f" The critical pressure is {critical:.6g} Pa; {jump}. {remedy}"
 
     def values(self, quantity: str, T: Array) -> Array:
         """Return CoolProp's values of a property at temperatures [K]."""

@@ -96,9 +96,8 @@ class Table(Load):
         """Check that the table is a history."""
         super().__post_init__()
         if len(self.times) != len(self.values) or len(self.times) < 2:
-            raise InputError(
-                f"a table needs as many times ({len(self.times)}) as values ({len(self.values)}), at least 2."
-            )
+            counts = f"as many times ({len(self.times)}) as values ({len(self.values)})"
+            raise InputError(f"a table needs {counts}, at least 2.")
         if not all(math.isfinite(x) for x in (*self.times, *self.values)):
             raise InputError("times and values of a table must be finite.")
         if any(b < a for a, b in pairwise(self.times)):

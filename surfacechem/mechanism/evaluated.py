@@ -129,10 +129,9 @@ def _misheld(phase: Any, state: Neighbour) -> str:
         return "" if state.current is None else need
     given = state.electric_potential
     if given is not None and symengine.sympify(given.value(symengine.Symbol("t"))).free_symbols:
-        return (
-            f"the potential of the neighbour {name} follows from its charge, so `electric-potential` is a number, that "
-            "of the start. Remove `capacitance` where the potential is prescribed."
-        )
+        problem = "follows from its charge, so `electric-potential` is a number, that of the start"
+        remedy = "Remove `capacitance` where the potential is prescribed."
+        return f"the potential of the neighbour {name} {problem}. {remedy}"
     return ""
 
 
@@ -232,10 +231,8 @@ def missing_species(surface: Any) -> tuple[str, ...]:
         for item in zip(phase.species_names, phase.X, indices(surface, phase), strict=True)
     )
     found = [name for name, part, index in there if part <= TRACE and made[index] > 0]
-    text = (
-        f"the neighbours hold no {listed(found)}, which reactions make: what they release is diluted without end, and "
-        "its entropy is counted as at a mole fraction of 1e-300."
-    )
+    diluted = "diluted without end, and its entropy is counted as at a mole fraction of 1e-300"
+    text = f"the neighbours hold no {listed(found)}, which reactions make: what they release is {diluted}."
     return (text,) if found else ()
 
 

@@ -294,11 +294,8 @@ class PhaseCheck:
                 raise error(message, node, key)
             pure = key.endswith(("model", "units", "-change", "-coverages"))
             if not pure and unitless(value, given, AMOUNT):
-                message = (
-                    f"{title}: {key} without a unit counts in kmol. Say what it counts in, such as "
-                    "`units: {energy: eV, quantity: molec}` beside it."
-                )
-                raise error(message, node, key)
+                remedy = "Say what it counts in, such as `units: {energy: eV, quantity: molec}` beside it."
+                raise error(f"{title}: {key} without a unit counts in kmol. {remedy}", node, key)
         for group in groups:
             there, missing = set(group) & set(node), set(group) - set(node)
             if there and missing:
@@ -465,10 +462,9 @@ class PhaseCheck:
             elif key in POSITIVE and not leading(value) > 0:
                 problem = f"{value!r} is no number above zero."
             elif wanted and (number := unitless(value, self.source.defaults(entry), wanted)):
-                problem = (
-                    f"{number:g} without a unit counts in {unit}. Write it with its unit, such as "
-                    f"`{key}: {example}`, or say at the top `units: {{quantity: mol, activation-energy: kJ/mol}}`."
-                )
+                said = "say at the top `units: {quantity: mol, activation-energy: kJ/mol}`"
+                remedy = f"Write it with its unit, such as `{key}: {example}`, or {said}."
+                problem = f"{number:g} without a unit counts in {unit}. {remedy}"
             elif key in ENERGIES:
                 problem = self._energy(value, entry)
             if problem:

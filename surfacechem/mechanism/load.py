@@ -261,11 +261,10 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
         result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring, around, fixed))
     if (odd := unpaired_dependence(result)) is not None:
         name, other = odd
-        message = (
-            f"species {name}: coverage-dependencies: {other}: this belongs to no free energy, so that energy would "
-            "come out of a cycle of coverages. Between two species make both linear, without heat capacity, and give "
-            f"{other} the same dependence on {name}, per site."
-        )
+        problem = "this belongs to no free energy, so that energy would come out of a cycle of coverages"
+        both = "Between two species make both linear, without heat capacity"
+        remedy = f"{both}, and give {other} the same dependence on {name}, per site."
+        message = f"species {name}: coverage-dependencies: {other}: {problem}. {remedy}"
         raise source.error(message, entries[name].get(KEY), other)
     return tuple(result)
 

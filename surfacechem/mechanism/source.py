@@ -172,11 +172,8 @@ class Source:
         if isinstance(value, bool) or not isinstance(value, str | int | float):
             raise self.error(f"{title}{key} must be a number, not {value!r}.", node, key)
         if wanted and unitless(value, declared, wanted):
-            message = (
-                f"{title}{key}: {value:g} has no unit, and `units` says nothing about it; write it in {spec.unit}, "
-                f"such as `{key}: {example}`."
-            )
-            raise self.error(message, node, key)
+            problem = f"{title}{key}: {value:g} has no unit, and `units` says nothing about it"
+            raise self.error(f"{problem}; write it in {spec.unit}, such as `{key}: {example}`.", node, key)
         try:
             units = cantera.UnitSystem(declared)
             found = converted(units, value if isinstance(value, str) else float(value), spec.unit)

@@ -226,11 +226,9 @@ def _outside(build: Build) -> ExternalRates | None:
     reads = tuple(build.variables.get(name, "the engine of the mechanism") for name in engine.reads)
     algebraic = [state for state in build.states if state.algebraic]
     if algebraic:
-        raise InputError(
-            f"{algebraic[0].name} has no heat capacity, so it would have to be found together with rates that are "
-            "evaluated outside. Give the interface a capacity, or let it share the temperature of a body.",
-            Place(path="interface.mechanism"),
-        )
+        problem = "has no heat capacity, so it would have to be found together with rates that are evaluated outside"
+        remedy = "Give the interface a capacity, or let it share the temperature of a body."
+        raise InputError(f"{algebraic[0].name} {problem}. {remedy}", Place(path="interface.mechanism"))
     return ExternalRates(engine, reads)
 
 

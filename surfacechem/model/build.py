@@ -290,11 +290,8 @@ class Build:
     def rate_of(self, name: str) -> Expression:
         """Return the time derivative of a prescribed variable that stores energy; it must not jump."""
         if name not in self.motion.ramp_rates and (load := self.loads[name]).jumps():
-            raise InputError(
-                f"{name} stores energy, so it cannot jump (at t = {load.jumps()[0]:g} s): the work would be unknown. "
-                "Give the jump a duration.",
-                load.place,
-            )
+            problem = f"it cannot jump (at t = {load.jumps()[0]:g} s): the work would be unknown"
+            raise InputError(f"{name} stores energy, so {problem}. Give the jump a duration.", load.place)
         return self.slope_of(name)
 
     def refuse_foreign(self, F: Expression, own: set[Any], law: Law) -> None:
@@ -305,11 +302,8 @@ class Build:
         foreign = {str(symbol) for symbol in symengine.sympify(F).free_symbols - own} & moving
         if foreign:
             allowed = ", ".join(sorted(str(symbol) for symbol in own))
-            raise InputError(
-                f"the energy of {law.name()} varies with {', '.join(sorted(foreign))}, which its balance does not "
-                f"know. It may vary with {allowed}.",
-                law.place,
-            )
+            problem = f"varies with {', '.join(sorted(foreign))}, which its balance does not know"
+            raise InputError(f"the energy of {law.name()} {problem}. It may vary with {allowed}.", law.place)
 
     def constrain(self, stated: Constraint) -> Constraint:
         """Keep a constraint; its modes and registers become parameters that only edges change."""

@@ -262,11 +262,9 @@ def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
         # A local release draws its energy from the heat of the interface, so the interface has to store heat.
         for law in build.interface.limits:
             if law.release == "local":
-                message = (
-                    "in a local release the interface pays, but here it has no heat of its own. Give it a temperature "
-                    "and a capacity, or use `release: joint`, in which the bodies do."
-                )
-                raise InputError(message, law.place)
+                problem = "in a local release the interface pays, but here it has no heat of its own"
+                remedy = "Give it a temperature and a capacity, or use `release: joint`, in which the bodies do."
+                raise InputError(f"{problem}. {remedy}", law.place)
     supports = {axis: _merged(build, far.receivers(build)) for axis, far in build.motion.far_fields.items()}
     return {INTERFACE: _merged(build, receivers(build)), **supports}
 

@@ -232,10 +232,8 @@ def node_of(scene: Scene, name: str) -> str:
     where = {"1": scene.bodies[0].temperature, "2": scene.bodies[1].temperature, "c": scene.interface.temperature}
     temperature = where[suffix]
     if temperature is None or isinstance(temperature, Load) or temperature in scene.loading:
-        raise InputError(
-            f"{name} has no temperature that evolves, so heat through a wall would not change it. Give it a heat "
-            "capacity, or let a reactor take its place."
-        )
+        problem = f"{name} has no temperature that evolves, so heat through a wall would not change it"
+        raise InputError(f"{problem}. Give it a heat capacity, or let a reactor take its place.")
     return temperature
 
 
@@ -324,10 +322,9 @@ def _refuse_other_phase(name: str, own: Any, given: Any) -> None:
     for ours, theirs in zip(own.species(), given.species(), strict=True):
         for what, same in _agreement(ours, theirs):
             if not same:
-                raise InputError(
-                    f"{ours.name} in the reactor of the neighbour {name} has another {what} than in the mechanism, so "
-                    "atoms or energy would be lost: give the reactor the phase of the mechanism's file."
-                )
+                problem = f"has another {what} than in the mechanism, so atoms or energy would be lost"
+                remedy = "give the reactor the phase of the mechanism's file"
+                raise InputError(f"{ours.name} in the reactor of the neighbour {name} {problem}: {remedy}.")
 
 
 def _agreement(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
@@ -355,10 +352,9 @@ def with_reactors(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
             raise InputError("a reactor can take the place of a body, not of the interface.")
         body = bodies[name]
         if body.energy is not None or not isinstance(body.temperature, Load):
-            raise InputError(
-                f"a reactor takes the place of {name}, so the case must not give it a heat capacity or a temperature "
-                f"that it shares. Write `{name}: {{temperature: 300 K}}`; the value is not used."
-            )
+            problem = "so the case must not give it a heat capacity or a temperature that it shares"
+            remedy = f"Write `{name}: {{temperature: 300 K}}`; the value is not used."
+            raise InputError(f"a reactor takes the place of {name}, {problem}. {remedy}")
         bodies[name] = body._replace(temperature=Hold(level=float(reactor.T)))
     first, second = bodies.values()
     return replace(scene, bodies=(first, second))
@@ -396,10 +392,8 @@ class BodyPort(NoFlow, cantera.Reservoir):
 
     def _rigid(self) -> str:
         """Return the reason why a wall on it cannot move, with the remedy."""
-        return (
-            f"a wall on {self.name} moves, and its work would be lost: a body stores heat here, not volume. Leave out "
-            "`velocity` and `K`, or put the moving wall between two gases."
-        )
+        problem = f"a wall on {self.name} moves, and its work would be lost: a body stores heat here, not volume"
+        return f"{problem}. Leave out `velocity` and `K`, or put the moving wall between two gases."
 
     def warm(self, temperature: float) -> None:
         """Set the temperature [K] that the walls see."""
@@ -414,10 +408,9 @@ class BodyPort(NoFlow, cantera.Reservoir):
             if wall.expansion_rate != 0.0:
                 raise InputError(self._rigid())
             if wall.heat_flux != 0.0:
-                raise InputError(
-                    f"a wall on {self.name} has a heat flux of its own, whose time is not known here. Give the wall U "
-                    f"or an emissivity, or prescribe {self.heat_name} under `loading`."
-                )
+                problem = f"a wall on {self.name} has a heat flux of its own, whose time is not known here"
+                remedy = f"Give the wall U or an emissivity, or prescribe {self.heat_name} under `loading`."
+                raise InputError(f"{problem}. {remedy}")
             heat += -wall.heat_rate if wall.left_reactor is self else wall.heat_rate
         return heat
 

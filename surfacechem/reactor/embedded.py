@@ -158,10 +158,9 @@ class EndError(Exception):
 
 def _refuse_folds(system: System) -> None:
     if any(item.fold is not None for item in system.edges):
-        raise InputError(
-            "the gap may lose its quasi-static equilibrium, in a mechanical fold. There it is infinitely fast, so that "
-            "an integrator without our search cannot come near. Give the gap a damper or a mass, or run the case alone."
-        )
+        problem = "the gap may lose its quasi-static equilibrium, in a mechanical fold"
+        reason = "There it is infinitely fast, so that an integrator without our search cannot come near"
+        raise InputError(f"{problem}. {reason}. Give the gap a damper or a mass, or run the case alone.")
 
 
 class EmbeddedScene:
@@ -424,9 +423,8 @@ class History:
         if self.times and t <= self.times[-1]:
             if t < self.times[-1]:
                 when = f"at t = {t:g} s, but has been recorded up to t = {self.times[-1]:g} s"
-                raise InputError(
-                    f"the interface is {when}. Set `initial_time` of a new network, or make the interface anew."
-                )
+                remedy = "Set `initial_time` of a new network, or make the interface anew."
+                raise InputError(f"the interface is {when}. {remedy}")
             return
         evaluation, n = self.scene.evaluation, len(self.scene.states)
         self.scene.put(t, x)

@@ -200,16 +200,13 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
 
     def add_sensitivity_species_enthalpy(self, species: Any) -> None:
         """Refuse: the thermo of species is in the formulas of the scene, where Cantera does not change it."""
-        raise InputError(
-            f"sensitivities to the enthalpy of {species} are not known in a network. Change the species in the "
-            "mechanism, or use `add_sensitivity_reaction`."
-        )
+        remedy = "Change the species in the mechanism, or use `add_sensitivity_reaction`."
+        raise InputError(f"sensitivities to the enthalpy of {species} are not known in a network. {remedy}")
 
     @property
     def _contents(self) -> NoReturn:
-        raise InputError(
-            f"{self.name} has no mass, volume or composition: it is an area. Its states are `{self.name}[name]`."
-        )
+        problem = f"{self.name} has no mass, volume or composition: it is an area"
+        raise InputError(f"{problem}. Its states are `{self.name}[name]`.")
 
     mass = volume = density = Y = _contents
 
@@ -307,9 +304,8 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
         push = lambda _: gas.phase.P - outside.phase.P  # noqa: E731
         scene = self._loaded("F_n", push)
         if edge := scene.edge_that_reads("F_n"):
-            raise InputError(
-                f"{edge} depends on the load of the gap, which a reactor gives at the ends of steps. Prescribe F_n."
-            )
+            problem = f"{edge} depends on the load of the gap, which a reactor gives at the ends of steps"
+            raise InputError(f"{problem}. Prescribe F_n.")
         self._set_scene(scene)
         self.loads["F_n"], self.pressing = push, (gas, outside)
         gap = scene.states.index("g_n")
@@ -339,19 +335,16 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
     def rates(self, t: float) -> Array:
         began = time.perf_counter()
         if self._is_perturbed and self._current:
-            raise InputError(
-                f"others have asked {self.name} for rates before Cantera has told it which of them it varies, so "
-                f"sensitivities would be wrong. Give {self.name} to the network before the reactors that take from it."
-            )
+            problem = f"others have asked {self.name} for rates before Cantera has told it which of them it varies"
+            remedy = f"Give {self.name} to the network before the reactors that take from it."
+            raise InputError(f"{problem}, so sensitivities would be wrong. {remedy}")
         if not self.passes_breakpoints:
             # Refuse a time beyond a breakpoint, where the equations are others.
             breakpoints = self.scene.breakpoints
             following = bisect_right(breakpoints, self.t)
             if following < len(breakpoints) and t > breakpoints[following]:
-                raise InputError(
-                    f"the loading has a breakpoint at t = {breakpoints[following]:g} s, which an ordinary ReactorNet "
-                    "steps over. Use surfacechem.reactor.ReactorNet."
-                )
+                problem = f"at t = {breakpoints[following]:g} s, which an ordinary ReactorNet steps over"
+                raise InputError(f"the loading has a breakpoint {problem}. Use surfacechem.reactor.ReactorNet.")
         rates = np.asarray(self._rates(t) / self.unit)
         if not self.passes_breakpoints:
             self._refuse_passed()
@@ -404,11 +397,9 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
 
     def left_out(self, partner: str) -> str:
         """Return the message on a network that has a partner of the interface, but not the interface."""
-        return (
-            f"the interface {self.name} to which {partner} is connected is not in the network, so what it gives and "
-            "takes would never change: give it to the network too. Where another interface has replaced it, make the "
-            "reactor anew with that."
-        )
+        problem = f"the interface {self.name} to which {partner} is connected is not in the network"
+        reason = "so what it gives and takes would never change: give it to the network too"
+        return f"{problem}, {reason}. Where another interface has replaced it, make the reactor anew with that."
 
     def _stopped(self, reason: str) -> InterfaceStopped:
         """Return the end of the scene, which is also stored, since Cantera loses exceptions."""
@@ -456,10 +447,8 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
         passed = [edges[i].reason for i in np.flatnonzero(self.scene.events.margins() < 0)]
         if passed:
             reasons = "; ".join(dict.fromkeys(passed))
-            raise InputError(
-                f"the scene jumps ({reasons}), which an ordinary ReactorNet does not follow. Use "
-                "surfacechem.reactor.ReactorNet."
-            )
+            problem = f"the scene jumps ({reasons}), which an ordinary ReactorNet does not follow"
+            raise InputError(f"{problem}. Use surfacechem.reactor.ReactorNet.")
 
     def parameters_at(self, t: float) -> Array:
         """Return the parameters of the scene at a time [s], from the present network."""
@@ -506,11 +495,10 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
             jumps = self.scene.events.instant.jumps if self.scene.events else []
             if self.bodies and any(jump.heat_out for jump in jumps if jump.t == t):
                 names = ", ".join(self.bodies)
-                raise InputError(
-                    f"the jump at t = {t:.9g} s gives heat at once to bodies without a capacity of their own, and "
-                    f"reactors stand for {names}: a reactor takes heat in time only. Give the body a heat capacity, "
-                    "and put a wall between it and the reactor."
-                )
+                jump = f"the jump at t = {t:.9g} s gives heat at once to bodies without a capacity of their own"
+                problem = f"{jump}, and reactors stand for {names}: a reactor takes heat in time only"
+                remedy = "Give the body a heat capacity, and put a wall between it and the reactor."
+                raise InputError(f"{problem}. {remedy}")
             self.ledger, self.booked_at = self.ledger + booked, self.x
         except EndError as end:
             raise self._stopped(f"{end} at t = {t:.9g} s") from None

@@ -240,9 +240,8 @@ class ReactorNet(cantera.ReactorNet):
     def solve_steady(self, loglevel: int = 0) -> None:
         """Refuse if there are interfaces: surface sites are conserved, so that steady states are not isolated."""
         if self.interfaces:
-            raise InputError(
-                "solve_steady does not know reacting surfaces, whose sites are conserved. Use advance_to_steady_state."
-            )
+            problem = "solve_steady does not know reacting surfaces, whose sites are conserved"
+            raise InputError(f"{problem}. Use advance_to_steady_state.")
         super().solve_steady(loglevel)
 
     def _begin_or_restart(self) -> None:
@@ -291,10 +290,9 @@ class ReactorNet(cantera.ReactorNet):
         for interface in self.interfaces:
             for role, reactor in interface.others():
                 if not isinstance(reactor, cantera.Reservoir) and reactor not in self.reactors:
-                    raise InputError(
-                        f"the reactor that {role} of {interface.name} is not in the network, so it "
-                        "would never change: give it to ReactorNet too, or let it be a Reservoir."
-                    )
+                    problem = f"the reactor that {role} of {interface.name} is not in the network"
+                    remedy = "give it to ReactorNet too, or let it be a Reservoir"
+                    raise InputError(f"{problem}, so it would never change: {remedy}.")
 
     def _arrive(self, t: float) -> None:
         pieces = [interface for interface in self.interfaces if t in interface.scene.breakpoints]
@@ -328,9 +326,8 @@ class ReactorNet(cantera.ReactorNet):
         fastest, start = int(speeds.argmax()), self.initial_time
         found = f", where {self.component_name(fastest)} changes by {speeds[fastest]:.3g} of itself a second"
         if abs(start) > self.time - start:
-            found += (
-                f". Times are resolved to {np.spacing(self.time):.1g} s there: let `initial_time` be nearer to zero"
-            )
+            resolved = f"Times are resolved to {np.spacing(self.time):.1g} s there"
+            found += f". {resolved}: let `initial_time` be nearer to zero"
         return found
 
     @contextmanager

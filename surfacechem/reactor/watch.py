@@ -129,11 +129,10 @@ class StepWatcher:
             if reactor in self._columns and not isinstance(reactor, StateVectorReactor):  # others hold theirs
                 names = [reactor.component_name(i) for i in range(reactor.n_vars)]
                 if "temperature" not in names:
-                    raise InputError(
-                        f"{item.name} jumps where the temperature of {reactor.name} may have a part, of which only "
-                        "the energy is known inside a step. Let it be an IdealGasReactor or another one with a "
-                        "temperature among its variables."
-                    )
+                    part = f"{item.name} jumps where the temperature of {reactor.name} may have a part"
+                    problem = f"{part}, of which only the energy is known inside a step"
+                    remedy = "Let it be an IdealGasReactor or another one with a temperature among its variables."
+                    raise InputError(f"{problem}. {remedy}")
                 found.append((place, self._columns[reactor].start + names.index("temperature")))
         return found
 
@@ -232,10 +231,8 @@ class StepWatcher:
         self.go(end)
         if before != (now := self._decisive_loads(start)):
             edge, name = next(each for each in before if before[each] != now[each])
-            raise InputError(
-                f"{edge} depends on the load {name}, which reads a reactor that cannot be set back to a time inside a "
-                "step. Let the load follow from time and from interfaces."
-            )
+            problem = f"the load {name}, which reads a reactor that cannot be set back to a time inside a step"
+            raise InputError(f"{edge} depends on {problem}. Let the load follow from time and from interfaces.")
         self.go(end)
         self._reached = [item.x for item in self.interfaces]
         if len(self._panels) >= MOST_PANELS:

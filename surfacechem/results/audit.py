@@ -480,10 +480,9 @@ def _capped_rates(system: System, rows: NDArray[np.float64]) -> Iterator[str]:
     for law, exponents in system.capped_laws if len(rows) else ():
         largest = float(np.nanmax(exponents(rows), initial=-np.inf))
         if largest > EXPONENT_CAP:
-            yield (
-                f"{law.title}: the logarithm of its rate coefficient (SI) reached {largest:.4g}; above "
-                f"{EXPONENT_CAP:g} the rate goes on along its tangent: it is instantaneous, but not the one stated"
-            )
+            reached = f"{law.title}: the logarithm of its rate coefficient (SI) reached {largest:.4g}"
+            tangent = "the rate goes on along its tangent: it is instantaneous, but not the one stated"
+            yield f"{reached}; above {EXPONENT_CAP:g} {tangent}"
 
 
 def active_cautions(system: System, rows: NDArray[np.float64]) -> list[str]:

@@ -292,9 +292,8 @@ def save(target: Path, columns: Sequence[Column], attributes: Mapping[str, str |
                 write_netcdf(temporary, columns, attributes)
         except PlacedError as second:
             raise OutputError(f"{error.message} In {kept.parent} it {second.message}", error.place) from None
-        raise OutputError(
-            f"{error.message} The results are kept in {kept}; move them from there.", error.place
-        ) from None
+        message = f"{error.message} The results are kept in {kept}; move them from there."
+        raise OutputError(message, error.place) from None
 
 
 def opened(path: str | Path, mode: Literal["r", "w"] = "r") -> netCDF4.Dataset:

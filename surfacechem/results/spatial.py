@@ -282,15 +282,10 @@ def unmet_accuracy(scene: Scene, errors: CellErrors, found: Accuracy | None = No
     accuracy, names = asked_cell_accuracy(scene), with_given_cells(scene)
     if accuracy is not None and not errors.largest <= accuracy:
         most = max(law.cells for _, law in _laws(scene) if law.accuracy is not None)
-        text = (
-            f"the accuracy {accuracy:g} of the cells is not reached with {most} of them: the error is about "
-            f"{errors.largest:.2g}. Ask for less, or for it to hold `after` a longer time, or give the other body more."
-        )
-        return (text,)
+        problem = f"the accuracy {accuracy:g} of the cells is not reached with {most} of them"
+        remedy = "Ask for less, or for it to hold `after` a longer time, or give the other body more."
+        return (f"{problem}: the error is about {errors.largest:.2g}. {remedy}",)
     if not names or found is None or found.asked is None or found.error <= MISSED_BY * found.asked:
         return ()
-    text = (
-        f"a tolerance does not reduce the error of cells, whose number is given for {' and '.join(names)}: let "
-        f"`cells: {{accuracy: {found.asked:g}}}` choose it, or give more"
-    )
-    return (text,)
+    problem = f"a tolerance does not reduce the error of cells, whose number is given for {' and '.join(names)}"
+    return (f"{problem}: let `cells: {{accuracy: {found.asked:g}}}` choose it, or give more",)

@@ -378,9 +378,8 @@ class Budget:
         if self.projected(ahead) > MOST_POINTS:
             text = f"the accuracy {self.rtol:.2g} of an integral over the surfaces is out of reach"
             what = f"{self.integrals} of them take" if self.integrals > 1 else "it takes"
-            raise OutOfReachError(
-                f"{text}: {what} {self.projected(ahead):.1g} pairs of points; ask for less, or smaller surfaces."
-            )
+            cost = f"{what} {self.projected(ahead):.1g} pairs of points"
+            raise OutOfReachError(f"{text}: {cost}; ask for less, or smaller surfaces.")
 
 
 class Rules:

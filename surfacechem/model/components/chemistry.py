@@ -158,10 +158,9 @@ def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> Iterato
     g_n = build.variables.get("g_n", law)
     if build.expanded(rate).free_symbols & build.expanded(g_n).free_symbols - {build.t}:
         return
-    text = (
-        f"{law.title} forms bonds across an open gap, which it does not read. Where they form in contact only let its "
-        "rate fall with the gap, by `gap-attachment` or a factor of g_n"
-    )
+    remedy = "let its rate fall with the gap, by `gap-attachment` or a factor of g_n"
+    problem = f"{law.title} forms bonds across an open gap, which it does not read"
+    text = f"{problem}. Where they form in contact only {remedy}"
     yield Caution(where(g_n > TOUCH_OVERLAP, -formed * rate, 0), text)
 
 
@@ -173,10 +172,8 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     for name in law.positive:  # a law that divides by an expression that is zero in this scene does not apply
         value = symengine.sympify(own[name] if name in own else build.variables.get(name, law))
         if value.is_Number and not value > 0:
-            raise InputError(
-                f"{law.name()} holds for {name} > 0 only; with the laws of this scene {name} is always {value}.",
-                law.place,
-            )
+            always = f"with the laws of this scene {name} is always {value}"
+            raise InputError(f"{law.name()} holds for {name} > 0 only; {always}.", law.place)
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own | {"dmu_dphi": own.get("dmu_dphi", 0) * room})
     if law_reads(law, "f") and not depends(rate, symengine.Symbol("f")):

@@ -95,18 +95,13 @@ def formulations(build: Build) -> tuple[Formulation, ...]:
     across = transverse_support(build, mount) if mount is not None else None
     if mount is not None and across is not None:
         if elastic:
-            raise InputError(
-                "the interface moves in two directions, but the elastic gap g_t of its potential has one. Leave out "
-                "what moves it across (`transverse`, w_t2, F_t2, v_2 or a law with two directions), or the potential "
-                "of g_t.",
-                PLACE,
-            )
+            problem = "the interface moves in two directions, but the elastic gap g_t of its potential has one"
+            moving = "what moves it across (`transverse`, w_t2, F_t2, v_2 or a law with two directions)"
+            raise InputError(f"{problem}. Leave out {moving}, or the potential of g_t.", PLACE)
         if given := {"v", "v_2"} & build.scene.loading.keys():
-            raise InputError(
-                f"{min(given)} is prescribed, but a mounting moves the interface along it. Prescribe `v` and `v_2` "
-                "under `loading`, or let the mounting give both.",
-                PLACE,
-            )
+            problem = f"{min(given)} is prescribed, but a mounting moves the interface along it"
+            remedy = "Prescribe `v` and `v_2` under `loading`, or let the mounting give both."
+            raise InputError(f"{problem}. {remedy}", PLACE)
         return _formulation(build, ALONG, mount, elastic), _formulation(build, ACROSS, across, elastic)
     if build.scene.transverse is not None:
         message = "a mounting across stands beside one along: give `tangential`, too."
@@ -244,11 +239,9 @@ def resistance(
     size = build.variables.call(bound, bound.statement, {**own, "v": speed})
     slope = derivative(size, speed)
     if depends(slope, speed) or symengine.sympify(size).subs({speed: 0}) != 0:
-        raise InputError(
-            f"in two directions {law.name()} has no direction at rest: it does not grow in proportion to the velocity, "
-            "nor does anything stick. Prescribe `v` and `v_2`, mount the bodies in one direction, or add `coulomb`.",
-            law.place,
-        )
+        problem = "has no direction at rest: it does not grow in proportion to the velocity, nor does anything stick"
+        remedy = "Prescribe `v` and `v_2`, mount the bodies in one direction, or add `coulomb`."
+        raise InputError(f"in two directions {law.name()} {problem}. {remedy}", law.place)
     return {d: slope * build.variables.get(d.velocity, law) for d in both}
 
 

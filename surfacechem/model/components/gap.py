@@ -33,10 +33,8 @@ def variables(build: Build) -> Iterator[Constraint | Margin | State]:
     if meets and mount.quasi_static:
         # No potential of the gap: closed, the interface carries any traction; open, it carries none.
         if not mount.law.k:
-            raise InputError(
-                "a rigid interface under dead load has no opening. Give the mounting a stiffness k.",
-                Place(path=mount.by),
-            )
+            message = "a rigid interface under dead load has no opening. Give the mounting a stiffness k."
+            raise InputError(message, Place(path=mount.by))
         far = far_field(build, mount)
         closed = contact(far.force(ZERO, ZERO), _bonded(build))
         opening = closed.active * (far.w + far.F / far.law.k)

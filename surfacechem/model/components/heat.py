@@ -211,11 +211,10 @@ def _into_both(build: Build, channels: Mapping[str, Expression]) -> Iterator[Pow
     (cold, _), (hot, name) = sorted((build.at_start(build.thermal.node_of[body].T), body) for body in bodies)
     if hot > cold:
         harmonic = 2 * cold * hot / (cold + hot)
-        yield (
-            f"`closure: mean` heats both bodies alike: as they start, {name} also from an interface that is cooler "
-            f"than itself, between {harmonic:.6g} K and {hot:.6g} K. Their entropy production together is positive. "
-            "Where no heat should flow uphill, give paths from each body to the interface."
-        )
+        between = f"an interface that is cooler than itself, between {harmonic:.6g} K and {hot:.6g} K"
+        heats = f"`closure: mean` heats both bodies alike: as they start, {name} also from {between}"
+        remedy = "Where no heat should flow uphill, give paths from each body to the interface."
+        yield f"{heats}. Their entropy production together is positive. {remedy}"
     produced = build.stretch * sum_h * difference**2 * (lower.T + upper.T) / (lower.T * upper.T * centre.T)
     text = "heat flow from interface to each body"
     yield PowerFlow(HEAT, INTERFACE, bodies[0], total, flux.name, text, parts, produced)

@@ -197,11 +197,8 @@ def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
     yield from kinks
     names = (*build.thermal.nodes, "T_c") if build.interface.temperature is None else ()
     if any(depends(psi, symengine.Symbol(name)) for name in names):
-        raise InputError(
-            "the interface's potential depends on temperature, but the interface has none. "
-            "Give `interface.temperature` a name.",
-            path="interface",
-        )
+        problem = "the interface's potential depends on temperature, but the interface has none"
+        raise InputError(f"{problem}. Give `interface.temperature` a name.", path="interface")
     _tractions(build, psi)
     if depends(psi, GAP):
         _contact_pressure(build, stored, bounds)
@@ -272,11 +269,10 @@ def _net_pressure(build: Build) -> None:
     relieved = [law for law in readers if law_reads(law, "p") and not getattr(law, "t_n_max", 0)]
     net = [law.name() for law in relieved if not (isinstance(law, UnderPressure) and law.pressure == "contact")]
     if attracting and net:
-        build.add(
-            f"The attraction of {' and '.join(attracting)} lowers the net pressure, which is read by "
-            f"{' and '.join(dict.fromkeys(net))}, although it presses the surfaces together. To read what the contact "
-            "bears give the law `pressure: contact`, or a factor `of: p_contact`."
-        )
+        lowers = f"The attraction of {' and '.join(attracting)} lowers the net pressure"
+        problem = f"which is read by {' and '.join(dict.fromkeys(net))}, although it presses the surfaces together"
+        remedy = "give the law `pressure: contact`, or a factor `of: p_contact`"
+        build.add(f"{lowers}, {problem}. To read what the contact bears {remedy}.")
         if any(law in relieved for law in build.interface.frictions) and "p" not in build.scene.loading:
             p = build.variables.get("p", "friction")
             build.add(Margin("p", p, "attraction takes all pressure", terminal=False))

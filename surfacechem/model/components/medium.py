@@ -103,11 +103,8 @@ def _free_energy(build: Build, found: Medium, fluid: Callable[[], FluidFit] | No
     if not given and fluid is not None:
         return fluid().energy()
     if len(given) < 2 or any(isinstance(found.properties[name], Property) for name in given):
-        raise InputError(
-            "a film that stores heat needs the density and the heat capacity of its medium both from a fluid, or both "
-            "as numbers.",
-            Place(path=PATH),
-        )
+        needed = "the density and the heat capacity of its medium both from a fluid, or both as numbers"
+        raise InputError(f"a film that stores heat needs {needed}.", Place(path=PATH))
     rho, cp, T, T_0 = (build.variables.get(name, "the film", PATH) for name in ("rho_m", "cp_m", "T_c", "T_0"))
     return rho * cp * (T - T_0 - T * log(T / T_0))
 

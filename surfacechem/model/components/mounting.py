@@ -257,11 +257,9 @@ def far_field(build: Build, mount: Support) -> FarField:
         force = build.variables.get(F, "the far field") if build.variables.has(F) else none
         load = build.loads.get(w)
         if law.c_b != 0 and given and load is not None and load.jumps():
-            raise InputError(
-                f"{w} cannot jump (at t = {load.jumps()[0]:g} s): the damper c_b of the bodies would bear infinite "
-                "traction. Give the jump a duration, or leave out the damper.",
-                load.place,
-            )
+            problem = f"(at t = {load.jumps()[0]:g} s): the damper c_b of the bodies would bear infinite traction"
+            remedy = "Give the jump a duration, or leave out the damper."
+            raise InputError(f"{w} cannot jump {problem}. {remedy}", load.place)
         w_dot = build.slope_of(w) if needed and given else none
         build.motion.far_fields[mount.axis] = FarField(mount, law, drive, w_dot, force)
     far: FarField = build.motion.far_fields[mount.axis]

@@ -121,11 +121,8 @@ def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed
     if not _is_force_prescribed(build):
         idle = next((law for law in laws.values() if law.length is not None and law.log_ratio is None), None)
         if idle is not None:
-            message = (
-                f"x_on of {idle.name()} belongs to a prescribed force. Here the potential says what the force does to "
-                "the equilibrium; leave it out."
-            )
-            raise InputError(message, idle.place)
+            here = "Here the potential says what the force does to the equilibrium; leave it out."
+            raise InputError(f"x_on of {idle.name()} belongs to a prescribed force. {here}", idle.place)
         return {}
     # A rate that depends on the force while its reverse follows from the affinity, without the work.
     for law in laws.values():
@@ -155,11 +152,9 @@ def _hold_at_zero(build: Build, law: RateLaw) -> None:
     remedy = "Write it as two reactions with `=>`, each with its own distance to the transition state"
     if "x_on" in dict(law.specs()):
         remedy = "Give `x_on`, 0 m where formation does not feel the force"
-    raise InputError(
-        f"{law.title} would come to the same equilibrium under any prescribed force: its rate feels the force, but "
-        f"how far a bond lets the load down as it forms is not known. {remedy}.",
-        law.place,
-    )
+    problem = "would come to the same equilibrium under any prescribed force"
+    reason = "its rate feels the force, but how far a bond lets the load down as it forms is not known"
+    raise InputError(f"{law.title} {problem}: {reason}. {remedy}.", law.place)
 
 
 def by_affinity(law: RateLaw) -> bool:

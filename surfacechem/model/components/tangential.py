@@ -343,11 +343,8 @@ def _sliding_row(
     if build.motion.creep_law is not None and len(build.interface.frictions) == 1 and damping != 0:
         return rest  # both friction and damper grow with the velocity
     if slope == 0:
-        raise InputError(
-            "nothing determines the sliding velocity: friction does not depend on it. Give the tangential mounting a "
-            "mass or a damper.",
-            PLACE,
-        )
+        problem = "nothing determines the sliding velocity: friction does not depend on it"
+        raise InputError(f"{problem}. Give the tangential mounting a mass or a damper.", PLACE)
     yield Margin(f"{STABLE_PREFIX}{v}", stable, kind.unstable, when=_while_sliding(kind), stability=str(v))
     return rest
 

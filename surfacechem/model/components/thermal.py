@@ -174,11 +174,9 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> Margin:
     explicit = {bond.dot: bond.dot - build.rows[name] for name, bond in build.bonding.items()}
     slope = _with_velocity(build, build.expanded(row.subs(explicit)), node.T)
     if slope == 0:
-        raise InputError(
-            f"nothing determines the interface temperature {node.name}: it has no capacity and no heat path. Give the "
-            "interface a capacity or a heat path, or let it share the temperature of a body.",
-            Place(path="interface.temperature"),
-        )
+        problem = f"nothing determines the interface temperature {node.name}: it has no capacity and no heat path"
+        remedy = "Give the interface a capacity or a heat path, or let it share the temperature of a body."
+        raise InputError(f"{problem}. {remedy}", Place(path="interface.temperature"))
     reason = f"ignition: no temperature {node.name} balances the heat that the interface produces"
     other = f"runaway cooling: no temperature {node.name} balances the heat that the interface takes up"
     carried = {power.rate: 0 for power in build.powers if power.channels}

@@ -62,11 +62,8 @@ def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: E
         return ()  # the potential is singular without bonds, so all of its traction is theirs
     borne = build.at_start(bonds)
     if abs(borne - strength) > STRENGTH_RTOL * strength:
-        raise InputError(
-            f"{law.name()}: at t_max / E_b = {start:g} m the bonds of the potential bear {borne:g} Pa, "
-            f"not the t_max of {strength:g} Pa. {SAME_STIFFNESS}",
-            law.place,
-        )
+        bear = f"the bonds of the potential bear {borne:g} Pa, not the t_max of {strength:g} Pa"
+        raise InputError(f"{law.name()}: at t_max / E_b = {start:g} m {bear}. {SAME_STIFFNESS}", law.place)
     # Margins check the same along a run, for parameters that vary or that a sweep changes.
     reason = "the bonds of the potential bear another traction than t_max where they begin to break"
     near = 2 * STRENGTH_RTOL - absolute(build.expanded(bonds / t_max) - 1)

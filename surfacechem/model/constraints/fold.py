@@ -111,11 +111,9 @@ def _coupled_nodes(build: Build, residuals: Sequence[Expression]) -> list[Node]:
     nodes = [node for node in build.thermal.free if any(depends(residual, node.T) for residual in residuals)]
     for node in nodes:
         if node.capacity() == 0:
-            raise InputError(
-                f"the traction of a quasi-static gap varies with {node.name}, which has no capacity. Give the "
-                "interface one, or mount the bodies with a damper or a mass.",
-                Place(path="interface.temperature"),
-            )
+            problem = f"the traction of a quasi-static gap varies with {node.name}, which has no capacity"
+            remedy = "Give the interface one, or mount the bodies with a damper or a mass."
+            raise InputError(f"{problem}. {remedy}", Place(path="interface.temperature"))
     return nodes
 
 

@@ -78,11 +78,9 @@ def states(build: Build, kinds: Sequence[Formulation]) -> Iterator[Constraint]:
     """Define displacements, speed, direction, and the velocities that follow; yield the mode and registers of slip."""
     inertial = kinds[0].inertial
     if not inertial and not all(kind.rate_dependent for kind in kinds):
-        raise InputError(
-            "dry friction in two directions does not say how fast the interface slides, nor do springs. Give the "
-            "mounting a mass `m`, or a damper `c_b` along both directions.",
-            PLACE,
-        )
+        problem = "dry friction in two directions does not say how fast the interface slides, nor do springs"
+        remedy = "Give the mounting a mass `m`, or a damper `c_b` along both directions."
+        raise InputError(f"{problem}. {remedy}", PLACE)
     mode = Mode("slip", 0.0, STICK_WORDS, where(SPEED > 0, 1.0, 0.0) if inertial else None)
     registers = (
         Register(str(b), "component of the direction in which sliding began", first, partial(_began, v))

@@ -103,10 +103,8 @@ def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:
     """Return the ratio of the impulse of friction to that of the pressure, for decelerating slip."""
     unknown = f"{law.name()}: what an impact takes from sliding is not known where"
     if law.transverse is not None:
-        raise InputError(
-            f"{unknown} friction differs from direction to direction, since it turns within the impact. {SOFTEN}",
-            law.place,
-        )
+        turns = "friction differs from direction to direction, since it turns within the impact"
+        raise InputError(f"{unknown} {turns}. {SOFTEN}", law.place)
     bound = build.bound(law)
     traction = build.variables.call(bound, bound.statement, {"p": P, "v": v, "direction": ONE})
     expression = symengine.sympify(traction).subs({symengine.Symbol("p"): P, symengine.Symbol("t_n"): -P})
@@ -120,9 +118,6 @@ def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:
         )
     ratio = slopes[-1]
     if depends(ratio, v) or depends(build.expanded(ratio), v):
-        raise InputError(
-            f"{unknown} the coefficient of friction varies with the sliding velocity, which changes within the impact. "
-            f"{SOFTEN}",
-            law.place,
-        )
+        varies = "the coefficient of friction varies with the sliding velocity, which changes within the impact"
+        raise InputError(f"{unknown} {varies}. {SOFTEN}", law.place)
     return ratio

@@ -59,10 +59,8 @@ def laws(build: Build) -> Iterator[Constraint]:
     closed, reclosing = build.mode("closed"), []
     for law in build.interface.limits:
         if not build.variables.has("t_n"):
-            message = (
-                "nothing gives the normal traction: mount the bodies (`mechanics`) or give a potential of the gap."
-            )
-            raise InputError(message, law.place)
+            remedy = "mount the bodies (`mechanics`) or give a potential of the gap"
+            raise InputError(f"nothing gives the normal traction: {remedy}.", law.place)
         bound = build.variables.bind(law, f"interface.limits.{law.name()}")
         strength = build.variables.call(bound, bound.statement)
         yield from _limit(build, law, strength, closed)
@@ -90,11 +88,9 @@ def _limit(build: Build, law: Limit, strength: Expression, closed: Expression | 
     modes, breaks, g = dict.fromkeys(lost, ZERO), broken(build, law, law.breaks), symengine.Symbol("g_n")
     if depends(build.psi, g) and not build.expanded(derivative(build.psi, g)).free_symbols & {*modes, *breaks}:
         names = " and ".join(item.name() for item in build.interface.potentials if law_reads(item, "g_n"))
-        raise InputError(
-            f"{law.name()} would change nothing: the tension of {names} does not depend on the bonds. Let it: use "
-            "`bonded-contact` or `bond-stiffness`, or the factor `proportional: {of: phi}`.",
-            law.place,
-        )
+        problem = f"{law.name()} would change nothing: the tension of {names} does not depend on the bonds"
+        remedy = "use `bonded-contact` or `bond-stiffness`, or the factor `proportional: {of: phi}`"
+        raise InputError(f"{problem}. Let it: {remedy}.", law.place)
     # In a local release the interface pays for the bonds; the gaps then move in a second jump, for which the bodies
     # pay.
     mount = support(build, "n")
