@@ -193,15 +193,8 @@ Accuracy = Annotated[
     float | None, Option("--accuracy", help="Relative accuracy to reach; solver and tolerance are chosen for it.")
 ]
 Quiet = Annotated[bool, Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
-Verbose = Annotated[
-    bool | None,
-    Option(
-        "--verbose/--quiet",
-        "-v/-q",
-        help="Print progress and more about the result, or nothing unless something is wrong.",
-        show_default=False,
-    ),
-]
+TALK = "Print progress and more about the result, or nothing unless something is wrong."
+Verbose = Annotated[bool | None, Option("--verbose/--quiet", "-v/-q", help=TALK, show_default=False)]
 
 
 def is_dataset(source: str) -> bool:

@@ -322,11 +322,8 @@ def _by_pint(number: str, given: str, unit: str, name: str, difference: bool) ->
 def _per_particle(source: Any, target: Any) -> Any:
     """Return the unit per mole if it is meant per particle, and the converse: eV for J/mol, kJ/mol for J."""
     registry = _registry()
-    if (
-        target.is_compatible_with("J/mol")
-        and source.is_compatible_with("J")
-        and PER_PARTICLE & {*map(str, source._units)}
-    ):
+    of_one = not PER_PARTICLE.isdisjoint(map(str, source._units))
+    if of_one and target.is_compatible_with("J/mol") and source.is_compatible_with("J"):
         return source / registry.particle
     if target.is_compatible_with("J") and source.is_compatible_with("J/mol"):
         return source * registry.particle

@@ -21,8 +21,6 @@ from surfacechem.laws import laws
 from surfacechem.mechanism.thermo import Bind, Formula, Species
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT, KILO, MOLECULAR
 
-NO_COVERAGES: Mapping[str, Expression] = {}
-
 COVERAGE_FLOOR = 1e-20
 """Floor of coverages in a rate that depends on their logarithm, as in Cantera."""
 
@@ -231,12 +229,9 @@ class InterfaceArrhenius(MechanismReaction):
         # One exponential of the sum: coefficient and constant may overflow while their product does not.
         return self.coefficient(values, affinity) * standard * self._amounts(values, self.products, 1)
 
-    def standard_affinity(
-        self, T: Expression, g_n: Expression = None, coverages: Mapping[str, Expression] = NO_COVERAGES
-    ) -> Expression:
-        """Return the standard Gibbs energy of the reaction over k_B T, including the elastic energy of bonds.
-
-        The elastic energy is that at the gap ``g_n`` [m]. Interactions are included if ``coverages`` are given.
+    def standard_affinity(self, T: Expression, g_n: Expression, coverages: Mapping[str, Expression]) -> Expression:
+        """Return the standard Gibbs energy of the reaction over k_B T, including the elastic energy of bonds at the gap
+        ``g_n`` [m] and the interactions of coverages.
         """
         total: Expression = 0
         for item in self.species:
@@ -246,7 +241,7 @@ class InterfaceArrhenius(MechanismReaction):
             value = item.gibbs(T)
             if item.spring is not None:
                 value += item.spring.energy(g_n) / BOLTZMANN
-            for interaction in item.interactions if coverages else ():
+            for interaction in item.interactions:
                 value += interaction.gibbs(T, coverages[interaction.variable]) / GAS_CONSTANT
             total += plain(nu) * value
         return total / T

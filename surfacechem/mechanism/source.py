@@ -217,10 +217,8 @@ class Source:
             raise self.error(f"no `phases` in the mechanism.{suggestion('phases', known)}", self.data, guess)
         surfaces = [known for known, entry in phases.items() if entry.get("thermo") in SURFACES]
         if name is None and not surfaces and len(phases) > 1:
-            raise InputError(
-                f"the mechanism has no phase that is a surface ({' or '.join(SURFACES)}), only {', '.join(phases)}.",
-                place,
-            )
+            problem = f"the mechanism has no phase that is a surface ({' or '.join(SURFACES)})"
+            raise InputError(f"{problem}, only {', '.join(phases)}.", place)
         surfaces = surfaces or list(phases)
         if name is None and len(surfaces) > 1:
             several = "the mechanism has several phases, name one: `phase` in a case, `--phase` of the command."

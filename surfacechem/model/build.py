@@ -405,6 +405,11 @@ class Build:
         self.name(quantity, symbol / self.stretch)
         return symbol
 
+    def law_domain(self, law: Law, bound: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
+        """Add where a law holds: the ranges that a run monitors, and the margins of its domain as ``bound``."""
+        self.law_ranges(law)
+        self.law_margins(bound, own, met)
+
     def law_ranges(self, law: Law) -> None:
         """Add the ranges of variables that a run monitors for a law."""
         for name, (low, high) in law.ranges.items():

@@ -331,15 +331,12 @@ def _agreement(ours: Any, theirs: Any) -> Iterator[tuple[str, bool]]:
     """Yield properties of a species, and whether two species of one name agree in them."""
     yield "composition", ours.composition == theirs.composition
     yield "weight", isclose(ours.molecular_weight, theirs.molecular_weight, rel_tol=RUN_EPS)
-    both = ours.thermo, theirs.thermo
+    both, R = (ours.thermo, theirs.thermo), cantera.gas_constant
     if None in both:
         return
     low, high = max(each.min_temp for each in both), min(each.max_temp for each in both)
     for T in np.clip(THERMO_TEMPERATURES, low, high).tolist():
-        for what, function, unit in (
-            ("enthalpy", "h", cantera.gas_constant * T),
-            ("entropy", "s", cantera.gas_constant),
-        ):
+        for what, function, unit in (("enthalpy", "h", R * T), ("entropy", "s", R)):
             found = [getattr(each, function)(T) for each in both]
             yield f"{what} at {T:g} K", isclose(*found, rel_tol=RUN_EPS, abs_tol=RUN_EPS * TERM_SIZE * unit)
 

@@ -523,10 +523,9 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
         recorded.
         """
         if self.scene.varies and not self._dated and name not in self.scene.states:
-            raise InputError(
-                f"an ordinary ReactorNet does not say at what time {name} is wanted, and histories of the scene vary. "
-                "Call `interface.record(net.time)` first, or use surfacechem.reactor.ReactorNet."
-            )
+            problem = f"an ordinary ReactorNet does not say at what time {name} is wanted"
+            remedy = "Call `interface.record(net.time)` first, or use surfacechem.reactor.ReactorNet."
+            raise InputError(f"{problem}, and histories of the scene vary. {remedy}")
         self._read_network()
         return self.scene.quantity(name, self.t, self.x)
 

@@ -114,8 +114,7 @@ def _through_film(build: Build, law: HeatTransfer) -> Iterator[PowerFlow]:
     ends, centre = _two_nodes(build, law), end_node(build, "interface", law)
     bound = build.variables.bind(law, f"heat.{law.name()}")
     r_1, r, r_2 = build.variables.call(bound, bound.resistances)
-    build.law_ranges(law)
-    build.law_margins(bound, {})
+    build.law_domain(law, bound, {})
     scale = r**2 + 4 * r * (r_1 + r_2) + 12 * r_1 * r_2
     beside = -2 * r / scale * (ends[1].T - ends[0].T)
     flows, produced = [], symengine.Integer(0)
@@ -139,8 +138,7 @@ def _paths(build: Build, law: HeatTransfer) -> Iterator[tuple[tuple[str, str], d
     bound = build.variables.bind(law, f"heat.{law.name()}")
     own = {"T_from": nodes[0].T, "T_to": nodes[1].T}
     channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
-    build.law_ranges(law)
-    build.law_margins(bound, {})
+    build.law_domain(law, bound, {})
     if law.closure == "medium":
         centre = end_node(build, "interface", law)
         for ends, node in zip(((a, "interface"), ("interface", b)), nodes, strict=True):

@@ -191,8 +191,7 @@ def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
     for law, F in stored.items():
         build.refuse_foreign(F, known, law)
         psi += F
-        build.law_ranges(law)
-        build.law_margins(bounds[law], gaps[law])
+        build.law_domain(law, bounds[law], gaps[law])
     psi, kinks = _in_sides(build, psi)
     yield from kinks
     names = (*build.thermal.nodes, "T_c") if build.interface.temperature is None else ()
@@ -245,9 +244,8 @@ def _energies(
         if (formula := getattr(bounds[law], "unbonded", None)) is not None:
             parts.add(build.variables.call(bounds[law], formula))
             for friction in (item for item in build.interface.frictions if item.breaks_bonds):
-                build.add(
-                    f"{friction.name()} breaks all bonds as sliding starts, and with them the adhesion of {law.name()}."
-                )
+                breaks = f"{friction.name()} breaks all bonds as sliding starts"
+                build.add(f"{breaks}, and with them the adhesion of {law.name()}.")
     unbonded, unbonded_energy = symengine.Mul(*parts), symengine.Integer(0)
     if unbonded != 1:
         g_t = symengine.Symbol("g_t")

@@ -68,8 +68,7 @@ def laws(build: Build) -> None:
     for law in found.growth:
         bound = build.variables.bind(law, f"{PATH}.growth.{law.name()}")
         rate = build.variables.call(bound, bound.statement)
-        build.law_ranges(law)
-        build.law_margins(bound, {})
+        build.law_domain(law, bound, {})
         quantity = Quantity(f"growth_{build.unique(law.label)}", "m/s", f"rate of the film's thickness by {law.title}")
         total += build.name(quantity, rate)
     if found.growth:
@@ -86,8 +85,7 @@ def _given(build: Build, name: str, value: float | Property) -> Expression:
         return build.constant(name, path, Spec(VARIABLES[name].unit, VARIABLES[name].long_name, above=0), value)
     bound = build.variables.bind(value, f"{path}.{value.name()}")
     expression = build.variables.call(bound, bound.statement)
-    build.law_ranges(value)
-    build.law_margins(bound, {})
+    build.law_domain(value, bound, {})
     return build.name(VARIABLES[name], expression)
 
 

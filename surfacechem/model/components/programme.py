@@ -139,22 +139,18 @@ def _left(build: Build, item: Stage) -> Expression:
     if item.duration is not None:
         spec = Spec("s", f"length of the stage {item.name}", above=0)
         return STAGE_START.symbol + build.parameters.add("length", f"{path}.for", spec, item.duration) - build.t
-    x, name, traction = _variable(build, item), item.variable, item.variable in SLIDING_TRACTIONS
+    name, traction = item.variable, item.variable in SLIDING_TRACTIONS
+    if name in build.thermal.nodes:
+        x = build.thermal.nodes[name].T
+    elif build.variables.has(name):
+        x = build.variables.get(name, f"the stage {item.name}")
+    elif build.is_named(name):
+        x = symengine.Symbol(name)
+    else:
+        roles = (role.variable for role in build.variables.roles if role.role not in ("constant", "internal"))
+        known = {*roles, *build.thermal.nodes} - INTERNAL
+        raise InputError(f"the stage {item.name} waits for '{name}'.{suggestion(name, known)}", item.place)
     spec = Spec("Pa" if traction else unit_of(name), f"end of the stage {item.name}")
     path = f"{path}.until.{name}{'' if item.rising else '.falls-to'}"
     end = build.parameters.add(f"{name}_end" if traction else name, path, spec, item.value)
     return end - x if item.rising else x - end
-
-
-def _variable(build: Build, item: Stage) -> Expression:
-    """Return the variable that a stage waits for: a temperature, a variable or a named quantity."""
-    if item.variable in build.thermal.nodes:
-        return build.thermal.nodes[item.variable].T
-    if build.variables.has(item.variable):
-        return build.variables.get(item.variable, f"the stage {item.name}")
-    if build.is_named(item.variable):
-        return symengine.Symbol(item.variable)
-    roles = (role.variable for role in build.variables.roles if role.role not in ("constant", "internal"))
-    known = {*roles, *build.thermal.nodes} - INTERNAL
-    message = f"the stage {item.name} waits for '{item.variable}'.{suggestion(item.variable, known)}"
-    raise InputError(message, item.place)

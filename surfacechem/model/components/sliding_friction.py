@@ -44,8 +44,7 @@ def laws(build: Build) -> Iterator[PowerFlow | State | Margin]:
         yield from memory(build, law, bound)
         met = pressed(build, law)
         resisted = resistance(build, law, bound, met)
-        build.law_ranges(law)
-        build.law_margins(bound, {}, met=met)
+        build.law_domain(law, bound, {}, met)
         power = symengine.Integer(0)
         for d, traction in resisted.items():
             across = " across v" if d is ACROSS else ""

@@ -121,17 +121,13 @@ def _temperature_state(build: Build, node: Node) -> State:
     algebraic = balances.second(node.free_energy, node.T) == 0
     members = [body for body in build.scene.bodies if build.thermal.members[body.name] == node.name]
     if algebraic and members:
-        raise InputError(
-            f"nothing evolves or prescribes {node.name}: give {members[0].name} a heat capacity C, or its "
-            "temperature a value.",
-            path=f"bodies.{members[0].name}",
-        )
+        owner = members[0].name
+        remedy = f"give {owner} a heat capacity C, or its temperature a value"
+        raise InputError(f"nothing evolves or prescribes {node.name}: {remedy}.", path=f"bodies.{owner}")
     initial = _guess(build, node) if algebraic else _initial(build, node)
     if not initial > 0:
-        raise InputError(
-            f"initial {node.name} = {initial:g} K is not an absolute temperature above zero.",
-            path=f"initial.{node.name}",
-        )
+        message = f"initial {node.name} = {initial:g} K is not an absolute temperature above zero."
+        raise InputError(message, path=f"initial.{node.name}")
     quantity = VARIABLES.get(
         node.name, Quantity(node.name, "K", f"temperature of {build.thermal.owners(node)}", node.name)
     )

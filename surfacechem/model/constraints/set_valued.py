@@ -111,11 +111,9 @@ def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:
     slopes = [derivative(expression, P).subs({P: symengine.RealDouble(p)}) for p in TRIAL_PRESSURES]
     finite, infinite = (build.at_start(slope) for slope in slopes)
     if finite != infinite:
-        raise InputError(
-            f"{law.name()}: the impulse of friction in an impact is not known where the coefficient of friction varies "
-            f"with the pressure, which is not finite then. {SOFTEN}",
-            law.place,
-        )
+        problem = f"{law.name()}: the impulse of friction in an impact is not known"
+        reason = "where the coefficient of friction varies with the pressure, which is not finite then"
+        raise InputError(f"{problem} {reason}. {SOFTEN}", law.place)
     ratio = slopes[-1]
     if depends(ratio, v) or depends(build.expanded(ratio), v):
         varies = "the coefficient of friction varies with the sliding velocity, which changes within the impact"
