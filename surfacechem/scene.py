@@ -291,6 +291,16 @@ class Interface:
         """Phases beside it whose potential follows from their charge."""
         return self.engine.electrodes if self.engine else ()
 
+    @property
+    def phi_max(self) -> float:
+        """Largest possible bonding state."""
+        return self.sites.phi_max if self.sites else 1.0
+
+    @property
+    def is_even(self) -> bool:
+        """True unless one body has fewer sites than the other; which one, the values of a run say."""
+        return self.sites is None or self.sites.density_1 == self.sites.density_2
+
 
 @dataclass(frozen=True)
 class Scene:

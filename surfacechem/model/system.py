@@ -182,7 +182,7 @@ class Margin(NamedTuple):
     """True if the domain of a law ends here, so that no equilibrium lies beyond."""
     below: tuple[Expression, str] | None = None
     """An expression, and the reason to report if it is negative when the margin closes."""
-    bound: tuple[str, float] | None = None
+    bound: tuple[str, Expression] | None = None
     """The state that the margin bounds, and the bound."""
     when: When = ALWAYS
     """Values of the modes in which it is active."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
+import symengine
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import Program
@@ -132,7 +133,8 @@ def are_led_back(
         if other in bonds:  # where one kind of bond occupies all sites, the others are zero
             y[:, j] = np.maximum(y[:, j], 0.0) if limit == 0 else 0.0
     j = names.index(name)
-    y[:, j] = limit
+    symbols = [parameter.symbol for parameter in system.parameters]
+    y[:, j] = symengine.Lambdify(symbols, [system.expand(limit)])(parameters)[:, 0]
     found = consistent(program, t, y, np.zeros_like(y), parameters)
     return found.valid & (found.ydot[:, j] >= 0 if limit == 0 else found.ydot[:, j] <= 0)
 

@@ -108,6 +108,18 @@ def test_fewer_partners_than_sites_bound_what_does_not_read_them():
     assert trajectory.end("phi") == 0.5
 
 
+@pytest.mark.parametrize("law", [MassAction(k_on=3.0, k_off=0.0), Bimolecular(k_f=1e-16, k_r=0.0)])
+@pytest.mark.parametrize(("path", "number"), [("interface.sites.upper", 5e15), ("interface.sites.lower", 8e16)])
+def test_the_bound_of_bonds_follows_densities_of_sites_that_a_run_changes(law, path, number):
+    """More partners than sites in the scene, fewer in the run, and the other way round."""
+    given, changed = Sites(2e16, 4e16), {"interface.sites.upper": 4e16, "interface.sites.lower": 2e16, path: number}
+    sites = Sites(changed["interface.sites.lower"], changed["interface.sites.upper"])
+    for one, other in ((given, sites), (sites, given)):
+        changes = {"interface.sites.lower": other.density_1, "interface.sites.upper": other.density_2}
+        found = closed(isothermal(law, one, phi=0.1), 60.0, changes).end("phi")
+        assert found == pytest.approx(other.phi_max, rel=1e-6)
+
+
 MIXING = (LatticeGas, SITES, 1.0), (partial(PartnerMixing, a=1e-16), Sites(1e16, 5e15), 0.5)
 
 

@@ -60,9 +60,8 @@ def variables(build: Build) -> Iterator[Bond | Margin]:
         _site_densities(build, sites)
     breaks = build.interface.limits and "phi" not in build.scene.loading and not build.interface.variables
     if breaks or any("phi" in law.stoichiometry() for law in build.interface.reactions):
-        limit = sites.phi_max if sites else 1.0
         density = build.variables.get("N_c", "the bonding state", "interface")
-        yield _bonding_state(build, VARIABLES["phi"], density, limit)
+        yield _bonding_state(build, VARIABLES["phi"], density, build.interface.phi_max)
     for variable in build.interface.variables:
         name, by = variable.name, f"interface.{variable.name}"
         amount = _amount(build, variable)
@@ -109,7 +108,7 @@ def _prescribed(build: Build, name: str, load: Load) -> Expression:
     if name == "J_c":
         build.add(Margin("J_c > 0", symbol - NO_AMOUNT, "the area stretch J_c reached zero"))
     if name == "phi":
-        _bounds(build, "phi", symbol, build.interface.sites.phi_max if build.interface.sites else 1.0)
+        _bounds(build, "phi", symbol, build.interface.phi_max)
     return symbol
 
 
@@ -125,13 +124,16 @@ def _site_densities(build: Build, sites: Sites) -> None:
         """Return the sites of one body; those of the reference body are the reference density."""
         if density == sites.density:
             return build.variables.get("n_c", "the interface", "interface")
-        spec = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0)
-        amount = build.constant(f"N_{k}", f"{by}.{build.scene.bodies[k - 1].name}", spec, density)
-        return _per_current_area(build, amount)
+        return _per_current_area(build, build.variables.get(f"N_{k}", "the interface", "interface"))
 
-    build.variables.define("N_c", partial(build.constant, "N_c", by, spec, sites.density), "constant", by)
+    of = [f"{by}.{body.name}" for body in build.scene.bodies]
+    path = by if build.interface.is_even else of[sites.reference - 1]
+    build.variables.define("N_c", partial(build.constant, "N_c", path, spec, sites.density), "constant", by)
     build.variables.define("n_c", n_c, "derived", by)
     for k, density in enumerate((sites.density_1, sites.density_2), start=1):
+        own = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0), density
+        amount = partial(build.constant, f"N_{k}", of[k - 1], *own)
+        build.variables.define(f"N_{k}", amount, "constant", by)
         build.variables.define(f"n_{k}", partial(of_body, k, density), "derived", by)
 
 
@@ -168,11 +170,16 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
         number = partial(build.constant, "slack", "run.slack", spec, BOUND_SLACK, internal=True)
         build.variables.define("slack", number, "internal", "run")
     slack = build.variables.get("slack", "the bounds")
-    spec = Spec("1", f"upper bound of {name}")
-    top = build.constant(f"{name}_max", f"{name}_max", spec, limit, internal=True)
-    below, above = f"{name} fell below its bound 0", f"{name} rose above its bound {limit:g}"
-    build.add(Margin(f"{name} >= 0", symbol + slack, below, bound=(name, 0.0)))
-    build.add(Margin(f"{name} <= {limit:g}", top + slack - symbol, above, bound=(name, limit)))
+    text, sites, shown = f"upper bound of {name}", build.interface.sites, f"{limit:g}"
+    if name != "phi" or sites is None or build.interface.is_even:
+        top = build.constant(f"{name}_max", f"{name}_max", Spec("1", text), limit, internal=True)
+    else:  # it follows the densities of sites of both bodies, which runs may change
+        N_c, other = (build.variables.get(x, "the bonds", "interface") for x in ("N_c", f"N_{3 - sites.reference}"))
+        top = build.name(Quantity("phi_max", "1", text), where(other < N_c, other / N_c, 1), output=False)
+        shown = "phi_max, the partners of a site"
+    below, above = f"{name} fell below its bound 0", f"{name} rose above its bound {shown}"
+    build.add(Margin(f"{name} >= 0", symbol + slack, below, bound=(name, symengine.Integer(0))))
+    build.add(Margin(f"{name} <= {limit:g}", top + slack - symbol, above, bound=(name, top)))
 
 
 def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:

@@ -92,11 +92,10 @@ def bending(build: Build, law: RateLaw, mu: Expression) -> tuple[Expression, Exp
 
 def _may_leave_the_range(build: Build) -> bool:
     """True if a law without an envelope may carry the bonding state out of its range."""
-    top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
-    if top is None or LN_PHI in build.scene.initial:
+    if "phi" not in build.bonding or LN_PHI in build.scene.initial:
         return False
-    laws = [law for law in build.interface.reactions if law.envelope is None]
-    return not all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws)
+    laws, even = [law for law in build.interface.reactions if law.envelope is None], build.interface.is_even
+    return not all(law.keeps_range and (even or "n_2" in reads(law.statement)) for law in laws)
 
 
 def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float]) -> bool:
@@ -118,7 +117,8 @@ def _is_singular(whole: Expression, phi: Expression, numbers: Mapping[Any, float
 
 def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression, name: str) -> Expression:
     """Return the rate at a bound, or next to it if it is singular there; the rate unchanged if both fail."""
-    whole, numbers = build.expanded(rate), {item.symbol: item.value for item in build.parameters.items}
+    whole, numbers = build.expanded(rate), {PHI_MAX: build.interface.phi_max}
+    numbers |= {item.symbol: item.value for item in build.parameters.items}
     phi = next((phi for phi in (at, inside) if not _is_singular(whole, phi, numbers)), None)
     if phi is None:
         return rate
