@@ -310,7 +310,7 @@ class ArrayRuns:
         keeps_inside, fits = self.jumps and (self.keeps_steps or bool(self.keep.reach)), False
         while not fits:
             batch = self._batch(problem, columns, self.room)
-            steps, events = np.minimum(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), MOST_ROWS).tolist()
+            steps, events = np.clip(batch.counts[:, [RECORDS, EVENTS]].max(axis=0), 1, MOST_ROWS).tolist()
             needed = steps * self.keeps_steps, events, 0, events * keeps_inside
             had = batch.records.shape[1], batch.events.shape[1], 0, batch.jumps.shape[1]
             fits = all(each <= rows for each, rows in zip(needed, had, strict=True))

@@ -14,6 +14,7 @@ from functools import cache
 import numpy as np
 import pytest
 import xarray
+from random_scenes import random_scene
 from sampling import every
 from typer.testing import CliRunner
 
@@ -26,6 +27,7 @@ from surfacechem.runs import arrays, checking, streaming
 from surfacechem.runs.checking import check
 from surfacechem.runs.keeping import STATUSES, Keep, extremes
 from surfacechem.runs.summaries import store_summary
+from surfacechem.solve.run import Run
 from surfacechem.tolerances import LINE_ERROR
 
 pytestmark = pytest.mark.around
@@ -497,6 +499,16 @@ def test_temperatures_without_capacity_are_found_at_the_starts_of_all_runs_at_on
     assert len(set(alone["T_c_last"])) == 3
     for name in ("steps", "T_c_last", "T_1_last", "T_c_max", "T_2_min"):
         np.testing.assert_array_equal(found[name], alone[name], err_msg=name)
+
+
+def test_runs_that_arrays_leave_open_at_their_start_need_no_tables():
+    """A slider that nothing resists: in arrays no run of the pilots takes a step."""
+    scene, end = random_scene(128)
+    simulation = surfacechem.Simulation.of(scene, Run(times=(0.0, end)))
+    plan = simulation.plan({"interface.friction.coulomb.mu": np.linspace(0.4, 0.6, 40)})
+    chunks = streaming.ChunkRuns(simulation, plan, Keep(last=("v",), max=("v",)), {})
+    found = chunks.columns(np.arange(plan.size))
+    assert set(found["status"]) == {STATUSES.index("stopped")}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts pages as Linux does")

@@ -158,6 +158,25 @@ def test_a_kink_that_starts_at_zero_fires_once_it_has_left(explicit, rtol, left)
     assert_alike(found, solve_arrays(shared, *columns), 2, 10 * rtol)
 
 
+@pytest.mark.parametrize("explicit", [True, False])
+def test_a_kink_within_roundoff_of_the_end_of_a_segment_fires_there(explicit, left):
+    """Loads turn where they cross zero, to rounding: the next segment cannot tell on which side they were."""
+    t, (y, dy), a = se.Symbol("t"), se.symbols("y dy"), se.Symbol("a")
+    program = compile_program(t, [y], [dy], [a], [dy - a + y], margins=[a - t])
+    shared = problem(program, [1.0], [0.0, 1.0], 1e-9, parameters=[0.3], margins=(Guard.restart(),))
+    shared = replace(shared, segments=np.array([0.0, 0.3, 1.0]), parameters=np.full((2, 1), 0.3))
+    zeros = np.nextafter(0.3, [0.0, 0.3, 1.0])
+    table = np.repeat(zeros[:, None, None], 2, axis=1)
+    columns = np.ones((3, 1)), table, np.array([shared.spacing]), np.zeros((1, 1)), shared.segments[None]
+    columns = *columns, np.zeros((1, 0))
+    lanes = replace(shared, explicit=explicit, implicit_lanes=not explicit)
+    found = lane_batch.solve_batch(lanes, *columns)
+    assert left[0] == 0
+    assert found.counts[:, EVENTS].tolist() == [1, 1, 1]
+    assert found.events[:, 0, 1] == pytest.approx(0.3, rel=1e-15)
+    assert_alike(found, solve_arrays(shared, *columns), 1, 1e-8)
+
+
 def test_a_step_onto_a_guard_that_fails_is_given_up(left):
     """Bonds that share a growing load and cool a light interface as they break: short of the guard a long step has
     seen, shorter ones may fail. All runs break, none by the stepper for single runs.

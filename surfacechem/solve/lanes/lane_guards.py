@@ -44,6 +44,18 @@ def start_margins(w: Any, fresh: Any) -> None:
 
 
 @compiled
+def any_marked_at_end(w: Any, lane: int) -> bool:
+    """Mark the kinks that reach zero at the end of a segment, as for a single run; True if there are any."""
+    found = False
+    for m in range(w.n_margins):
+        side = w.side[m, lane]
+        counts = w.kinds[m, 0] == 0 and abs(side) > 0.5 and side * w.kinds[m, 1] <= 0.0
+        if counts and abs(w.margin[m, lane]) <= FORMULA_EPS * w.margin_largest[m, lane]:
+            w.fired[m, lane], found = 1.0, True
+    return found
+
+
+@compiled
 def _crosses(w: Any, m: int) -> Any:
     """Mask of lanes whose guard m has crossed zero in its direction; a strict guard by more than roundoff."""
     value, side, direction = lanes(w.margin[m]), lanes(w.side[m]), w.kinds[m, 1]

@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from surfacechem.compile.vectors import LANES
-from surfacechem.solve.lanes.lane_guards import ends_on_guard, find_crossings, may_cross, start_margins
+from surfacechem.solve.lanes.lane_guards import (
+    any_marked_at_end,
+    ends_on_guard,
+    find_crossings,
+    may_cross,
+    start_margins,
+)
 from surfacechem.solve.lanes.lane_step import (
     END_STAGE,
     find_defects,
@@ -39,7 +45,7 @@ from surfacechem.solve.radau.explicit import STIFF_STEPS
 from surfacechem.solve.radau.step import EVENT, FINISHED, LEFT, loosening
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
 from surfacechem.solve.radau.work import MARGINS, RATES, StepperRecord, compiled, evaluate, laying_out, row_of
-from surfacechem.tolerances import NEGLIGIBLE, SQRT_EPS, ULPS
+from surfacechem.tolerances import FORMULA_EPS, NEGLIGIBLE, NEWTON_EPS, RUN_EPS, SQRT_EPS, ULPS
 
 MOST_TRIALS = 16
 """Rejected trials in a row after which the cause is noise or stiffness. At a singular start, where each is a tenth of
@@ -239,7 +245,7 @@ def _write_events(w: Any, lane: int) -> bool:
             nearest = min(nearest, w.side[m, lane] * w.margin[m, lane])
     for m in range(w.n_margins):
         value = w.side[m, lane] * w.margin[m, lane]
-        if w.fired[m, lane] < 0.5 or value > max(nearest, 0.0):
+        if w.fired[m, lane] < 0.5 or value > max(nearest, FORMULA_EPS * w.margin_largest[m, lane]):
             w.fired[m, lane] = 0.0
             continue
         if counts[EVENTS] < events.shape[0]:
@@ -281,12 +287,15 @@ def _move_on(w: Any) -> None:
 def _go_on(w: Any, lane: int) -> None:
     """Handle what follows an accepted step: an event, the next segment, or the end."""
     whole = w.t[lane] == w.end[lane]
-    if w.landing[lane] > 0:
+    # A step that ends just short of a kink at the end of the segment reaches the end, as far as time tells.
+    near = w.landing[lane] > 0 and w.end[lane] - w.t[lane] <= NEWTON_EPS * w.t[lane] + RUN_EPS * w.h[lane]
+    more = (whole or near) and w.segment[lane] + 2 < w.segments.shape[1]
+    if (more and any_marked_at_end(w, lane)) or w.landing[lane] > 0:
         w.landing[lane], w.fresh[lane] = 0, 1.0
         if _write_events(w, lane):
             _end(w, lane, EVENT)
             return
-    if whole and w.segment[lane] + 2 < w.segments.shape[1]:
+    if more:
         w.segment[lane] += 1
         _enter(w, lane)
     elif whole:
