@@ -142,22 +142,22 @@ def spelled(name: str) -> str:
     ('T_{1}', '\\phi', 'D_{\\mathrm{coulomb}}', '\\theta_{\\mathrm{O(s)}}')
     """
     head, _, subscript = name.partition("_")
+    if not subscript:
+        return _letters(head)
     if head == "theta":  # species of a surface
         subscript = re.sub(r"(?<=\w)_([sS])(?=_|$)", r"(\1)", subscript)
-    return f"{_letters(head)}_{{{_subscript(subscript)}}}" if subscript else _letters(head)
+    parts = subscript.split("_")
+    # Indices are single letters and numbers, set without an upright font.
+    if all(len(part) == 1 or part in GREEK or re.fullmatch(r"\w?\d\w?", part) for part in parts):
+        subscript = " ".join(part if re.search(r"\d", part) else _letters(part) for part in parts)
+    elif set(parts) & GREEK:
+        subscript = r"\,".join(map(_letters, parts))
+    else:
+        subscript = rf"\mathrm{{{'_'.join(parts)}}}".replace("_", r"\,")
+    return f"{_letters(head)}_{{{subscript}}}"
 
 
 def _letters(text: str) -> str:
     if text in GREEK:
         return f"\\{text}"
     return text if len(text) <= 1 else rf"\mathrm{{{text}}}"
-
-
-def _subscript(text: str) -> str:
-    parts = text.split("_")
-    # Indices are single letters and numbers, set without an upright font.
-    if all(len(part) == 1 or part in GREEK or re.fullmatch(r"\w?\d\w?", part) for part in parts):
-        return " ".join(part if re.search(r"\d", part) else _letters(part) for part in parts)
-    if set(parts) & GREEK:
-        return r"\,".join(map(_letters, parts))
-    return rf"\mathrm{{{'_'.join(parts)}}}".replace("_", r"\,")

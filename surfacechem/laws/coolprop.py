@@ -139,24 +139,22 @@ class CoolPropFluid(Fluid):
     def limits(self) -> list[float | None]:
         """Return the limits of the properties and the temperatures of boiling and condensing, if any [K]."""
         boils, condenses = (self._asked("T", "P", self.pressure, "Q", quality) for quality in (0, 1))
-        low, high = self._least(), self._call("Tmax")
+        coolprop, low, high = _coolprop(), self._call("Tmin"), self._call("Tmax")
+        freezes = self._asked("T_freeze") or 0.0
+        with suppress(ValueError):  # mixtures, substances without a melting line, and pressures beyond its ends
+            melting = coolprop.AbstractState("?", self.name).melting_line
+            freezes = float(melting(coolprop.iT, coolprop.iP, self.pressure))
+        # CoolProp's minimum may belong to the liquid, which a vapour below the triple pressure does not reach.
+        if freezes * (1 + SATURATION_DISTANCE) > low:
+            low = freezes * (1 + SATURATION_DISTANCE)
+        elif self.pressure < (self._asked("p_triple") or 0.0):
+            low *= 1 + SATURATION_DISTANCE
         # Of a mixture near its critical point CoolProp finds only one of them.
         if boils is not None and condenses is None:
             condenses = self._end("gas", high, boils)
         elif condenses is not None and boils is None:
             boils = self._end("liquid", low, condenses)
         return [low, high, boils, condenses]
-
-    def _least(self) -> float:
-        """Return the least temperature with properties: the freezing point, or CoolProp's minimum."""
-        coolprop, low, freezes = _coolprop(), self._call("Tmin"), self._asked("T_freeze") or 0.0
-        with suppress(ValueError):  # mixtures, substances without a melting line, and pressures beyond its ends
-            melting = coolprop.AbstractState("?", self.name).melting_line
-            freezes = float(melting(coolprop.iT, coolprop.iP, self.pressure))
-        if freezes * (1 + SATURATION_DISTANCE) > low:
-            return freezes * (1 + SATURATION_DISTANCE)
-        # CoolProp's minimum may belong to the liquid, which a vapour below the triple pressure does not reach.
-        return low * (1 + SATURATION_DISTANCE) if self.pressure < (self._asked("p_triple") or 0.0) else low
 
     def _asked(self, *question: str | float) -> float | None:
         """Return a number of the fluid from CoolProp: a constant, or its temperature at saturation; None if it has

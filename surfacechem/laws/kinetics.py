@@ -259,11 +259,12 @@ class BondRates(RateLaw):
         """Logarithm of the rate of formation over that of rupture; None if no bonds form."""
         # A symbol is a number that a run may change, so that bonds may form.
         k_on = vars(self)["k_on"]
-        return self._log_ratio if is_symbolic(k_on) or k_on else None
 
-    def _log_ratio(self, phi: Expression, f: Expression, T_c: Expression) -> Expression:
-        on, off = self.log_coefficients(f, T_c)
-        return on - off + log_fraction(1 - phi) - log_fraction(phi)
+        def ratio(phi: Expression, f: Expression, T_c: Expression) -> Expression:
+            on, off = self.log_coefficients(f, T_c)
+            return on - off + log_fraction(1 - phi) - log_fraction(phi)
+
+        return ratio if is_symbolic(k_on) or k_on else None
 
 
 class Bell(BondRates):

@@ -54,7 +54,15 @@ def draw(axes: Sequence[Axes], dataset: Data) -> None:
         _draw_tractions(axes[1], dataset, along, at, reach)
     else:
         _draw_field(axes[1], dataset)
-    _draw_force(axes[2], dataset)
+    # The force over the approach, and that of the local law.
+    approach, force = dataset["g_n"].values, dataset["t_n"].values
+    style.draw_curve(axes[2], dataset, "g_n", force, label="force")
+    if "local_difference" in dataset:
+        local = dataset["force"].values + dataset["local_difference"].values
+        axes[2].plot(dataset["approach"].values, local, "o", color="black", markersize=4, label="local law")
+    style.label(axes[2].xaxis, "Approach", "m", approach)
+    style.label(axes[2].yaxis, "Force", "N", force)
+    style.legend(axes[2])
 
 
 def _is_axisymmetric(dataset: Data) -> bool:
@@ -169,15 +177,3 @@ def _draw_field(ax: Axes, dataset: Data) -> None:
     ax.set(xlim=shown[0], ylim=shown[1])
     style.label(ax.xaxis, "x", "m", shown[0])
     style.label(ax.yaxis, "y", "m", shown[1])
-
-
-def _draw_force(ax: Axes, dataset: Data) -> None:
-    """Draw the force over the approach, and the force of the local law."""
-    approach, force = dataset["g_n"].values, dataset["t_n"].values
-    style.draw_curve(ax, dataset, "g_n", force, label="force")
-    if "local_difference" in dataset:
-        local = dataset["force"].values + dataset["local_difference"].values
-        ax.plot(dataset["approach"].values, local, "o", color="black", markersize=4, label="local law")
-    style.label(ax.xaxis, "Approach", "m", approach)
-    style.label(ax.yaxis, "Force", "N", force)
-    style.legend(ax)

@@ -346,8 +346,15 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
                 problem = f"at t = {breakpoints[following]:g} s, which an ordinary ReactorNet steps over"
                 raise InputError(f"the loading has a breakpoint {problem}. Use surfacechem.reactor.ReactorNet.")
         rates = np.asarray(self._rates(t) / self.unit)
-        if not self.passes_breakpoints:
-            self._refuse_passed()
+        if not self.passes_breakpoints and self.scene.events is not None:
+            # Refuse a state beyond an edge that no network has carried out.
+            edges = self.scene.model.system.edges
+            passed = [edges[i].reason for i in np.flatnonzero(self.scene.events.margins() < 0)]
+            if passed:
+                jumps = f"the scene jumps ({'; '.join(dict.fromkeys(passed))})"
+                raise InputError(
+                    f"{jumps}, which an ordinary ReactorNet does not follow. Use surfacechem.reactor.ReactorNet."
+                )
         self.evaluations += 1
         self.seconds += time.perf_counter() - began
         return rates
@@ -438,17 +445,6 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
         """Return the guards of the transitions in the present network at a time [s]."""
         self._read_network()
         return self.scene.transitions(t, self.x)
-
-    def _refuse_passed(self) -> None:
-        """Refuse a state beyond an edge that no network has carried out."""
-        if self.scene.events is None:
-            return
-        edges = self.scene.model.system.edges
-        passed = [edges[i].reason for i in np.flatnonzero(self.scene.events.margins() < 0)]
-        if passed:
-            reasons = "; ".join(dict.fromkeys(passed))
-            problem = f"the scene jumps ({reasons}), which an ordinary ReactorNet does not follow"
-            raise InputError(f"{problem}. Use surfacechem.reactor.ReactorNet.")
 
     def parameters_at(self, t: float) -> Array:
         """Return the parameters of the scene at a time [s], from the present network."""

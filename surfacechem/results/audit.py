@@ -458,31 +458,30 @@ def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[BalanceVerdict, ...]
     return tuple(BalanceVerdict(p.title, *ranges[p.departure], own) for p, own in zip(pairs, lawful, strict=True))
 
 
-def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
-    """Return all findings except the verdicts, in words."""
+def findings(trajectory: Trajectory, found: Accuracy | None) -> Iterator[str]:
+    """Yield all findings except the verdicts, in words."""
     system, rows = trajectory.model.system, np.empty((0, 0))
     if system.capped_laws or system.cautions[0]:  # arguments of compiled functions at outputs and steps
         model, result, steps = trajectory.model, trajectory.result, trajectory.result.steps
         rows = model.inputs(result, result.times, result.outputs, trajectory.rates, result.segment)
         if steps is not None:
             rows = np.concatenate([rows, model.inputs(result, steps.t, steps.y, steps.ydot, steps.segment)])
-    return [
-        *extrapolations(system, trajectory.ranges),
-        *_capped_rates(system, rows),
-        *active_cautions(system, rows),
-        *_lost_fluxes(trajectory),
-        *_inaccurate(trajectory, accuracy),
-    ]
-
-
-def _capped_rates(system: System, rows: NDArray[np.float64]) -> Iterator[str]:
-    """Yield warnings about laws whose rate exceeded exp(EXPONENT_CAP) at one of the states."""
+    yield from extrapolations(system, trajectory.ranges)
     for law, exponents in system.capped_laws if len(rows) else ():
         largest = float(np.nanmax(exponents(rows), initial=-np.inf))
         if largest > EXPONENT_CAP:
             reached = f"{law.title}: the logarithm of its rate coefficient (SI) reached {largest:.4g}"
             tangent = "the rate goes on along its tangent: it is instantaneous, but not the one stated"
             yield f"{reached}; above {EXPONENT_CAP:g} {tangent}"
+    yield from active_cautions(system, rows)
+    yield from _lost_fluxes(trajectory)
+    # An error that is unknown, well beyond the requested accuracy, or too large for a result.
+    if found is not None and math.isnan(found.error) and trajectory.status == "finished":
+        yield f"the error is not known: {found.source.partition(': ')[2]}"
+    elif found is not None and found.error > (LARGE_ERROR if found.asked is None else MISSED_BY * found.asked):
+        wanted = "" if found.asked is None else f", where {found.asked:.0e} was asked"
+        worst = max(found.variables, key=lambda name: found.variables[name], default="the result")
+        yield f"the error of {worst} is {found.error:.1e}{wanted}"
 
 
 def active_cautions(system: System, rows: NDArray[np.float64]) -> list[str]:
@@ -493,17 +492,6 @@ def active_cautions(system: System, rows: NDArray[np.float64]) -> list[str]:
     values = function(rows).reshape(len(rows), -1)
     least, size = np.nanmin(values, axis=0), np.nanmax(np.abs(values), axis=0)
     return [item.text for item, x in zip(cautions, least < -RUN_EPS * size, strict=True) if x]
-
-
-def _inaccurate(trajectory: Trajectory, found: Accuracy | None) -> list[str]:
-    """Return a warning of an error that is unknown, well beyond the requested accuracy, or too large for a result."""
-    if found is not None and math.isnan(found.error) and trajectory.status == "finished":
-        return [f"the error is not known: {found.source.partition(': ')[2]}"]
-    if found is None or not found.error > (LARGE_ERROR if found.asked is None else MISSED_BY * found.asked):
-        return []
-    wanted = "" if found.asked is None else f", where {found.asked:.0e} was asked"
-    worst = max(found.variables, key=lambda name: found.variables[name], default="the result")
-    return [f"the error of {worst} is {found.error:.1e}{wanted}"]
 
 
 def _lost_fluxes(trajectory: Trajectory) -> list[str]:

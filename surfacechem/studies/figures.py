@@ -150,17 +150,14 @@ class Line(NamedTuple):
             return np.nan
         spans = [float(np.nanmax(part) - np.nanmin(part)) or 1.0 for part in self.exact]
         line, points = (np.column_stack([x / spans[0], y / spans[1]]) for x, y in (self.exact, (self.x, self.y)))
-        own = points[np.isfinite(points).all(axis=1)]
-        return float(max(_distance(point, line[np.isfinite(line).all(axis=1)]) for point in own))
-
-
-def _distance(point: Array, line: Array) -> float:
-    """Return the distance of a point from a polyline of shape (n, 2)."""
-    # Distance from the line, not along y: at a jump of the curve both of its sides have the same x.
-    start, step = line[:-1], np.diff(line, axis=0)
-    length = np.maximum(np.sum(step**2, axis=1), np.finfo(float).tiny)
-    along = np.clip(np.sum((point - start) * step, axis=1) / length, 0, 1)
-    return float(np.min(np.hypot(*(point - start - along[:, None] * step).T)))
+        line, points = (rows[np.isfinite(rows).all(axis=1)] for rows in (line, points))
+        start, step, worst = line[:-1], np.diff(line, axis=0), 0.0
+        length = np.maximum(np.sum(step**2, axis=1), np.finfo(float).tiny)
+        for point in points:
+            # Distance from the line, not along y: at a jump of the curve both of its sides have the same x.
+            along = np.clip(np.sum((point - start) * step, axis=1) / length, 0, 1)
+            worst = max(worst, float(np.min(np.hypot(*(point - start - along[:, None] * step).T))))
+        return worst
 
 
 def _coincide(one: Line, other: Line) -> bool:

@@ -209,27 +209,26 @@ class Page(NamedTuple):
             [inline_svg(draw(), f"s{i}f{k}-") for k, draw in enumerate(section.drawings)]
             for i, section in enumerate(self.sections)
         ]
+        figures = []
+        if self.draw is not None:
+            from surfacechem.plots.style import narrow
+
+            with narrow():
+                slim = self.draw()
+            wide = self.draw()
+            figures = [inline_svg(wide)]
+            if slim.get_figwidth() < wide.get_figwidth():  # a phone shows this version instead
+                figures.append(inline_svg(slim, "n0-"))
         # The font of formulas is a data address, so that the page needs no other file.
         formulas = any(section.equations for section in self.sections)
         font = f"data:font/woff2;base64,{b64encode(FONT.read_bytes()).decode()}" if formulas else ""
-        return template.render(page=self, figures=self._figures(), drawn=drawn, machine=machine(), font=font)
+        return template.render(page=self, figures=figures, drawn=drawn, machine=machine(), font=font)
 
     def write(self, target: Path) -> None:
         """Save the page as one HTML file, whole or not at all."""
         text = self.html()
         with replacing(target) as temporary:
             temporary.write_text(text, encoding="utf-8", errors="surrogateescape")
-
-    def _figures(self) -> list[str]:
-        """Return the figure as SVG and, if it is narrower, the version that a phone shows instead."""
-        if self.draw is None:
-            return []
-        from surfacechem.plots.style import narrow
-
-        with narrow():
-            slim = self.draw()
-        wide = self.draw()
-        return [inline_svg(wide), *([inline_svg(slim, "n0-")] if slim.get_figwidth() < wide.get_figwidth() else [])]
 
 
 def inline_svg(figure: Figure, prefix: str = "f0-") -> str:

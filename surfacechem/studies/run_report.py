@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 
 from surfacechem import format as cases
 from surfacechem.compile.typeset import Equation, equations
-from surfacechem.contracts.terms import Law
 from surfacechem.errors import InputError, Place
 from surfacechem.format.plans import recorded_plan
 from surfacechem.model.system import System
@@ -158,9 +157,14 @@ def _scene(case: cases.Case, attributes: Mapping[str, Any]) -> Iterator[PageSect
     if surface is not None:
         tables.append(PageTable(("body or law", "kind", "numbers"), surface_rows(scene), "Surfaces"))
         acting += [*surface.pairs, *surface.gap_laws, *surface.heat_laws]
-    stated = list(dict.fromkeys(law for kind in acting for law in _stated(type(kind))))
+    stated = []
+    for law in acting:
+        name = f"{law.contract}: {law.name().replace('-', ' ')}"
+        for block in FORMULA.findall(f"{inspect.getdoc(type(law))}\n"):
+            pieces = re.split(r"(?<=[,;]) *\\quad *", " ".join(block.split()))
+            stated.append(Equation("", tuple(pieces), name, source(type(law))))
     yield PageSection("The scene", words, tables, drawings=[lambda: drawing.figure(scene)])
-    yield PageSection("Laws", equations=stated)
+    yield PageSection("Laws", equations=list(dict.fromkeys(stated)))
     if spatial.is_divided(scene):  # the equations of all cells have the same form
         system = replace(case, scene=spatial.few(case.scene)).system()
     lines, symbols = equations(system)
@@ -194,14 +198,6 @@ def equation_sheet(system: System, title: str) -> Sheet:
     ]
     left_out = "guards against overflow, division by zero and what no time resolves; `--format python` has them"
     return Sheet(f"{title}: {system.regime}", [("left out", left_out)], {"": rows})
-
-
-def _stated(law: type[Law]) -> Iterator[Equation]:
-    """Yield the formulas in the docstring of a law."""
-    name = law.name().replace("-", " ")
-    for block in FORMULA.findall(f"{inspect.getdoc(law)}\n"):
-        pieces = re.split(r"(?<=[,;]) *\\quad *", " ".join(block.split()))
-        yield Equation("", tuple(pieces), f"{law.contract}: {name}", source(law))
 
 
 def _events(dataset: Data) -> list[PageSection]:

@@ -41,16 +41,16 @@ def energies(build: Build) -> None:
             stretching = derivative(derivative(build.psi, bond.symbol), g_n) / bond.density
             build.variables.define(quantity.name, partial(build.name, quantity, stretching), "derived", BOND_ELASTICITY)
     elastic = {role.variable for role in build.variables.roles if role.by == BOND_ELASTICITY}
+
+    def shared() -> Expression:
+        """Name the force per bond, tension over bonded sites, with a margin that ends a step at a change of sign."""
+        t_n, n_c, phi = (build.variables.get(x, "the force per bond", "interface") for x in ("t_n", "n_c", "phi"))
+        build.add(Margin("t_n", t_n, "the load on the bonds changes its sign", terminal=False))
+        carrying = where(phi > LEAST_BONDED, phi, LEAST_BONDED)
+        return build.name(VARIABLES["f"], positive(t_n) / (n_c * carrying))
+
     if build.variables.has("t_n") and "f" not in elastic:
-        build.variables.define("f", partial(_shared, build), "derived", SHARED_LOAD)
-
-
-def _shared(build: Build) -> Expression:
-    """Define the force per bond as tension over bonded sites, with a margin that ends a step at a change of sign."""
-    t_n, n_c, phi = (build.variables.get(x, "the force per bond", "interface") for x in ("t_n", "n_c", "phi"))
-    build.add(Margin("t_n", t_n, "the load on the bonds changes its sign", terminal=False))
-    carrying = where(phi > LEAST_BONDED, phi, LEAST_BONDED)
-    return build.name(VARIABLES["f"], positive(t_n) / (n_c * carrying))
+        build.variables.define("f", shared, "derived", SHARED_LOAD)
 
 
 def laws(build: Build) -> Iterator[Margin]:

@@ -35,7 +35,15 @@ def variables(build: Build) -> Iterator[Thermal]:
         spec = Spec("K", "reference temperature", above=0)
         build.variables.define("T_0", partial(build.constant, "T_0", "T_0", spec, scene.T_0), "constant", "T_0")
     if build.interface.temperature is None:
-        mean = partial(_mean_temperature, build)
+
+        def mean() -> Expression:
+            shares, nodes = build.shares(), build.thermal.node_of
+            if SURROUNDINGS in shares and SURROUNDINGS not in nodes:
+                problem = "heat is lost to surroundings that have no temperature"
+                raise InputError(f"{problem}. Add `surroundings`.", path="interface")
+            inverse = symengine.Add(*(share / nodes[end].T for end, share in shares.items()))
+            return build.name(VARIABLES["T_c"], 1 / inverse)
+
         build.variables.define("T_c", mean, "derived", "harmonic mean of the bodies, no medium")
     thermal = Thermal({}, {})
     given: list[tuple[str, str | Load | None, str]] = [
@@ -78,14 +86,6 @@ def _with_member(build: Build, thermal: Thermal, variable: str, temperature: str
     role = "prescribed" if node.prescribed else ("temperature node" if name == variable else "merged")
     build.variables.define(variable, partial(symengine.Symbol, name), role, f"{member}: {name}")
     return Thermal({**thermal.nodes, name: node}, {**thermal.members, member: name})
-
-
-def _mean_temperature(build: Build) -> Expression:
-    shares = build.shares()
-    if SURROUNDINGS in shares and SURROUNDINGS not in build.thermal.node_of:
-        raise InputError("heat is lost to surroundings that have no temperature. Add `surroundings`.", path="interface")
-    inverse = symengine.Add(*(share / build.thermal.node_of[end].T for end, share in shares.items()))
-    return build.name(VARIABLES["T_c"], 1 / inverse)
 
 
 def rows(build: Build) -> Iterator[PowerFlow | State | Margin]:

@@ -25,7 +25,7 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.model.automaton import ONE, REST_TIME_PATH, ZERO, Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import FarField, far_field, feels_pressure, support
+from surfacechem.model.components.mounting import far_field, feels_pressure, support
 from surfacechem.model.constraints.set_valued import TRIAL_PRESSURES, friction_impulse
 from surfacechem.model.system import RTOL_PATH, Margin
 from surfacechem.tolerances import NEWTON_EPS, PICOMETRE
@@ -107,7 +107,19 @@ def impacts(build: Build) -> Iterator[Constraint]:
         return
     far = far_field(build, mount)
     speed, pressing = absolute(V), -far.force(ZERO, ZERO) / far.law.m
-    at_rest, remembered = _rest_condition(build, far, speed, pressing) if far.law.e != 0 else (ONE, {})
+    at_rest, remembered = ONE, {}
+    if far.law.e != 0:  # one if the bodies do not rebound, else zero, and the new value of the register that it reads
+        spec = Spec("1", "relative tolerance of the run")
+        tolerance = build.constant("tolerance", RTOL_PATH, spec, 0.0, internal=True)
+        swift = where(speed > FASTEST.symbol, speed, FASTEST.symbol)
+        rebound = far.law.e * speed
+        nothing = NO_SPEED * tolerance
+        # The next flight takes 2 rebound / pressing, all flights together 1 / (1 - e) times as long.
+        brief = pressing * build.t * ((1 - far.law.e) * nothing + SHORTEST_REBOUND)
+        slow = where(rebound < nothing * (swift + LEAST_IMPACT), 1, where(2 * rebound < brief, 1, 0))
+        spec = Spec("s", "time at which rebounds rest")
+        at_once = build.constant("rests_at", REST_TIME_PATH, spec, -1.0, internal=True)
+        at_rest, remembered = where(build.t > at_once, slow, 1), {FASTEST.symbol: swift}
     yield from friction_impulse(build, (1 + far.law.e) * far.law.m * speed)
     hits = Edge(
         "impact",
@@ -122,21 +134,6 @@ def impacts(build: Build) -> Iterator[Constraint]:
     rest = Edge("rest", -ONE, reason, modes_at_rest, equilibrates=True, when={LANDED.symbol: (1,)})
     # These edges are due at the same time as slip that would begin while the contact is still open, and go first.
     yield Constraint((), (LANDED, FASTEST) if remembered else (LANDED,), (hits, rest), at_once=True)
-
-
-def _rest_condition(
-    build: Build, far: FarField, speed: Expression, pressing: Expression
-) -> tuple[Expression, dict[Expression, Expression]]:
-    """Return an indicator, one if the bodies do not rebound, else zero, and new values of the registers it reads."""
-    tolerance = build.constant("tolerance", RTOL_PATH, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
-    swift = where(speed > FASTEST.symbol, speed, FASTEST.symbol)
-    rebound = far.law.e * speed
-    nothing = NO_SPEED * tolerance
-    # The next flight takes 2 rebound / pressing, all flights together 1 / (1 - e) times as long.
-    brief = pressing * build.t * ((1 - far.law.e) * nothing + SHORTEST_REBOUND)
-    slow = where(rebound < nothing * (swift + LEAST_IMPACT), 1, where(2 * rebound < brief, 1, 0))
-    at_once = build.constant("rests_at", REST_TIME_PATH, Spec("s", "time at which rebounds rest"), -1.0, internal=True)
-    return where(build.t > at_once, slow, 1), {FASTEST.symbol: swift}
 
 
 def jumps(build: Build) -> Iterator[str]:
