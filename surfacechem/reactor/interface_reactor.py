@@ -351,10 +351,9 @@ class InterfaceReactor(NoFlow, StateVectorReactor):
             edges = self.scene.model.system.edges
             passed = [edges[i].reason for i in np.flatnonzero(self.scene.events.margins() < 0)]
             if passed:
-                jumps = f"the scene jumps ({'; '.join(dict.fromkeys(passed))})"
-                raise InputError(
-                    f"{jumps}, which an ordinary ReactorNet does not follow. Use surfacechem.reactor.ReactorNet."
-                )
+                reasons = "; ".join(dict.fromkeys(passed))
+                problem = f"the scene jumps ({reasons}), which an ordinary ReactorNet does not follow"
+                raise InputError(f"{problem}. Use surfacechem.reactor.ReactorNet.")
         self.evaluations += 1
         self.seconds += time.perf_counter() - began
         return rates

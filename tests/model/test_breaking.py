@@ -15,7 +15,7 @@ from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.mechanism import load_mechanism
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import GAS_CONSTANT
-from surfacechem.results.audit import audit
+from surfacechem.results.audit import audit, findings
 from surfacechem.scene import Interface, Mounting, Scene
 
 K = 1e12
@@ -107,6 +107,12 @@ def test_a_strength_breaks_the_bond_that_it_names(two_bonds):
     assert after["theta_free_s"] == pytest.approx(0.75, rel=1e-14)
 
 
+def test_a_run_tells_where_it_leaves_the_range_of_a_strength(two_bonds, monkeypatch):
+    monkeypatch.setattr(TensileStrength, "ranges", {"T_c": (250.0, 290.0)})
+    told = findings(pulled(two_bonds, {"weak(s)": 0.5, "strong(s)": 0.5}), None)
+    assert next(told).startswith("tensile strength is an extrapolation: T ran from 300 to")
+
+
 def test_bonds_on_two_sites_give_back_both():
     limits = [TensileStrength(t_max=varying(1e6, Proportional(of="phi")))]
     start = {"PL(s)": 0.4, "P(s)": 0.3, "L(s)": 0.3}
@@ -123,9 +129,8 @@ def test_sliding_breaks_the_bonds_of_a_mechanism(two_bonds):
     loading = {"p": Hold(level=1e6), "w_t": Ramp(rate=1e-6)}
     friction = BondedCoulomb(mu=0.3, mu_b=0.8, mu_ub=0.4)
     start = {"weak(s)": 0.5, "strong(s)": 0.5}
-    mount = Mounting(k=K)
-    whole = scene(two_bonds, ["weak(s)", "strong(s)"], start, loading, [friction], tangential=mount)
-    trajectory = solve(whole)
+    bonds, mount = ["weak(s)", "strong(s)"], Mounting(k=K)
+    trajectory = solve(scene(two_bonds, bonds, start, loading, [friction], tangential=mount))
     slip = trajectory.jumps[0]
     assert slip.edge.name == "slip forward"
     assert slip.t == pytest.approx(0.8, rel=1e-12)
@@ -141,8 +146,7 @@ def test_a_bond_that_several_reactions_break_goes_the_first_way(two_bonds):
 def test_a_limit_names_its_bonds_or_is_refused(two_bonds):
     with pytest.raises(InputError, match=r"no bond is called 'weka\(s\)'.*weak\(s\)"):
         pulled(two_bonds, {"free(s)": 1.0}, breaks="weka(s)")
-    limit = TensileStrength(t_max=1e6, breaks="bond")
-    interface = Interface("T", sites=SITES, limits=[limit])
+    interface = Interface("T", sites=SITES, limits=[TensileStrength(t_max=1e6, breaks="bond")])
     loading = {"w_n": Ramp(rate=1e-6)}
     initial = {"T": 300.0, "phi": 1.0}
     bare = Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial=initial, normal=Mounting(k=K))

@@ -62,6 +62,7 @@ def laws(build: Build) -> Iterator[Constraint]:
             remedy = "mount the bodies (`mechanics`) or give a potential of the gap"
             raise InputError(f"nothing gives the normal traction: {remedy}.", law.place)
         bound = build.variables.bind(law, f"interface.limits.{law.name()}")
+        build.law_domain(law, bound, {})
         strength = build.variables.call(bound, bound.statement)
         yield from _limit(build, law, strength, closed)
         symbols = build.expanded(strength).free_symbols
