@@ -407,13 +407,13 @@ class Build:
 
     def law_domain(self, law: Law, bound: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
         """Add where a law holds: the ranges that a run monitors, and the margins of its domain as ``bound``."""
-        self.law_ranges(law)
+        self.law_ranges(law, own)
         self.law_margins(bound, own, met)
 
-    def law_ranges(self, law: Law) -> None:
+    def law_ranges(self, law: Law, own: Mapping[str, Expression]) -> None:
         """Add the ranges of variables that a run monitors for a law."""
         for name, (low, high) in law.ranges.items():
-            self.notes.append(Range(str(self.variables.get(name, law)), low, high, law.title))
+            self.notes.append(Range(str(self._read(law, name, own)), low, high, law.title))
 
     def law_margins(self, law: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
         """Add the margins of the domain of a law, except for the bounds in ``met``, which its arguments satisfy."""

@@ -228,9 +228,8 @@ def suffix_of(scene: Scene, name: str) -> str:
 
 def node_of(scene: Scene, name: str) -> str:
     """Return the name of the evolving temperature of a body or of the interface; InputError if it has none."""
-    suffix = suffix_of(scene, name)
     where = {"1": scene.bodies[0].temperature, "2": scene.bodies[1].temperature, "c": scene.interface.temperature}
-    temperature = where[suffix]
+    temperature = where[suffix_of(scene, name)]
     if temperature is None or isinstance(temperature, Load) or temperature in scene.loading:
         problem = f"{name} has no temperature that evolves, so heat through a wall would not change it"
         raise InputError(f"{problem}. Give it a heat capacity, or let a reactor take its place.")

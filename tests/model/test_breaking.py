@@ -10,6 +10,7 @@ from solved import closed
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import TensileStrength
 from surfacechem.laws.factors import Proportional
+from surfacechem.laws.free_energy import Quadratic
 from surfacechem.laws.friction import BondedCoulomb
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.mechanism import load_mechanism
@@ -107,10 +108,11 @@ def test_a_strength_breaks_the_bond_that_it_names(two_bonds):
     assert after["theta_free_s"] == pytest.approx(0.75, rel=1e-14)
 
 
-def test_a_run_tells_where_it_leaves_the_range_of_a_strength(two_bonds, monkeypatch):
-    monkeypatch.setattr(TensileStrength, "ranges", {"T_c": (250.0, 290.0)})
+@pytest.mark.parametrize(("law", "name"), [(TensileStrength, "T_c"), (Quadratic, "T")])
+def test_a_run_tells_where_it_leaves_the_range_of_a_law(two_bonds, monkeypatch, law, name):
+    monkeypatch.setattr(law, "ranges", {name: (250.0, 290.0)})
     told = findings(pulled(two_bonds, {"weak(s)": 0.5, "strong(s)": 0.5}), None)
-    assert next(told).startswith("tensile strength is an extrapolation: T ran from 300 to")
+    assert f"{law.name().replace('-', ' ')} is an extrapolation: T ran from 300 to" in next(told)
 
 
 def test_bonds_on_two_sites_give_back_both():

@@ -61,6 +61,7 @@ def variables(build: Build) -> Iterator[Thermal]:
             law = build.variables.bind(body.energy, f"bodies.{body.name}", f"_{k}")
             F = law.energy(T=T, T_0=build.variables.get("T_0", f"the body {body.name}", f"bodies.{body.name}"))
             build.refuse_foreign(F, {T}, body.energy)
+            build.law_domain(body.energy, law, {"T": T})
             thermal = thermal.with_energy(body.name, F)
     yield thermal
 
