@@ -21,7 +21,7 @@ from surfacechem.model.system import Account, Margin, Named, Note, Range, Role, 
 from surfacechem.model.variables import Parameters, Variables
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Body, Conduction, Interface, Scene, volume_shares
-from surfacechem.tolerances import NO_AMOUNT, RUN_EPS
+from surfacechem.tolerances import NO_AMOUNT, RUN_EPS, TINY
 
 
 class Bond(NamedTuple):
@@ -488,7 +488,7 @@ class Build:
         """Add margins that keep varying parameters in their range, with slack for roundoff at closed bounds."""
         found = []
         for law, name, spec, value in self.variables.varying:
-            slack = NO_AMOUNT * abs(getattr(law, name).value)
+            slack = max(NO_AMOUNT * abs(getattr(law, name).value), TINY)  # zero is within a closed bound, too
             low, why = max(spec.above, spec.at_least), f"{law.title}: {name} left its range ({spec.range}) as it varies"
             if math.isfinite(low):
                 above = value - low + (slack if spec.at_least >= low else 0)

@@ -67,6 +67,12 @@ def test_a_film_that_stores_heat_needs_a_temperature_of_its_own():
         assemble(Scene(bodies(), interface, [path("lower", "upper", 1.0)], {}, None, 300.0, APART))
 
 
+def test_a_parameter_that_varies_and_is_zero_is_in_its_range():
+    law = PressureConductance(between=("lower", "upper"), h_c=varying(0.0, Linear(of="phi", slope=-1.5)), H=1e9)
+    loading = {"phi": Ramp(start=0.1, rate=0.5), "p": Hold(level=1e6)}
+    assert run(Scene(bodies(), Interface(None), [law], loading, None, 300.0, APART), 1.5).status == "finished"
+
+
 def test_a_parameter_that_varies_out_of_its_range_stops_the_run():
     law = PressureConductance(between=("lower", "upper"), h_c=1e3, H=varying(1e9, Linear(of="phi", slope=-1.5)))
     loading = {"phi": Ramp(start=0.1, rate=0.5), "p": Hold(level=1e6)}
