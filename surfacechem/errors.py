@@ -148,7 +148,7 @@ def suggestion(name: str, known: Iterable[str], listed_by: str = "") -> str:
 
 
 def refuse_unknown(
-    names: Iterable[object], known: Collection[str], message: str, place: Place | None = None, listed_by: str = ""
+    names: object, known: Collection[str], message: str, place: Place | None = None, listed_by: str = ""
 ) -> None:
     """Raise InputError for the first name that is not among the known ones; {} in the message stands for it.
 
@@ -157,6 +157,8 @@ def refuse_unknown(
         ...
     surfacechem.errors.InputError: no parameter 'mu_s'. Did you mean 'mu'? Known: k, mu.
     """
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise InputError(f"a list of names is needed, not {names!r}.", place)
     for name in names:
         if not isinstance(name, str) or name not in known:
             raise InputError(f"{message.replace('{}', str(name))}.{suggestion(str(name), known, listed_by)}", place)

@@ -95,7 +95,10 @@ class Run:
     def __post_init__(self) -> None:
         """Check the tolerances, and that output times start at zero, where the initial values hold, and increase."""
         if not isinstance(self.times, tuple):  # a list or an array, which compare in other ways
-            object.__setattr__(self, "times", tuple(map(float, self.times)))
+            try:
+                object.__setattr__(self, "times", tuple(map(float, self.times)))
+            except (TypeError, ValueError):
+                raise InputError(f"output times are a list of numbers, not {self.times!r}.") from None
         times = self.times
         if len(times) < 2 or times[0] != 0 or not all(map(operator.lt, times, times[1:])) or times[-1] == np.inf:
             raise InputError(
