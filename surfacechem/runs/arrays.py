@@ -540,7 +540,8 @@ class ArrayRuns:
         names = system.variable_names
         named = {j: whole(values[names[j]]) for total in system.totals for j in total.variables}
         outputs = np.asfortranarray(batch.outputs[..., n:])
-        ledger = outputs if all_reached else np.where(reached[..., None], outputs, outputs[:, :1])
+        first = np.where(reached[:, :1, None], outputs[:, :1], 0.0)  # a run without outputs has none in its memory
+        ledger = outputs if all_reached else np.where(reached[..., None], outputs, first)
         rounded = of_each(np.fmax, owner, self._rounding(rows), len(reached))
         columns: Columns = {}
         left = zip(("energy", "entropy"), system.totals, residuals(system.totals, named, ledger), strict=True)
