@@ -272,12 +272,11 @@ def _check_guards(run: Trajectory, inputs: Array) -> None:
     model, first = run.model, len(run.model.margins)
     if model.jumper is None or model.program.margins is None:
         return
-    active = [model.system.active_guards(row)[first:] for row in inputs[:, 1 + 2 * model.program.n :]]
-    least = -EQUATION_MISMATCH * model.jumper.first_magnitudes(inputs)[:, first:]
-    passed = (model.program.margins(inputs)[:, first:] < least) & active
-    for k, j in np.argwhere(passed)[:1]:
-        why = model.system.edges[j].reason
-        raise InputError(f"at t = {inputs[k, 0]:.3g} s it is beyond a jump of the scene: {why}.")
+    least = -EQUATION_MISMATCH * model.jumper.first_magnitudes(inputs)
+    for k, j in np.argwhere(model.program.margins(inputs) < least):
+        if j >= first and model.system.active_guards(inputs[k, 1 + 2 * model.program.n :])[j]:
+            why = model.system.edges[j - first].reason
+            raise InputError(f"at t = {inputs[k, 0]:.3g} s it is beyond a jump of the scene: {why}.")
 
 
 def _check_jumps(solution: Solution, run: Trajectory, side: float) -> None:
