@@ -47,8 +47,22 @@ others.
 """
 
 ORDER = (
-    *("thermal", "conduction", "programme", "interface", "threshold", "unilateral", "chemistry", "force"),
-    *("sliding_friction", "gap", "tangential", "medium", "heat", "fold", "mounting", "envelope"),
+    "thermal",
+    "conduction",
+    "programme",
+    "interface",
+    "threshold",
+    "unilateral",
+    "chemistry",
+    "force",
+    "sliding_friction",
+    "gap",
+    "tangential",
+    "medium",
+    "heat",
+    "fold",
+    "mounting",
+    "envelope",
 )
 """Order of components that build on, or are printed after, those before them; all others follow by name."""
 

@@ -122,6 +122,13 @@ class Bonding(PerfectContact):
         }
 
 
+def _from_reference(case: PerfectContact, t: Array) -> Quantities:
+    """Return the solution of a case of `Bonding` that starts without bonds at the reference temperature."""
+    bonds = _unbonded(case)
+    x, T, _, capacity = bonds.heated(t)
+    return bonds.exchanged(t, x, T, capacity)
+
+
 @lru_cache(maxsize=1)  # whatever follows from the parameters is computed once
 def _unbonded(case: PerfectContact) -> Bonding:
     """Return the case of `Bonding` that starts without bonds at the reference temperature."""
@@ -148,9 +155,7 @@ class ExothermicBonding(PerfectContact):
     readings = read(potential="K_0", relaxation_time="tau")
 
     def quantities(self, t: Array) -> Quantities:
-        bonds = _unbonded(self)
-        x, T, _, capacity = bonds.heated(t)
-        return bonds.exchanged(t, x, T, capacity)
+        return _from_reference(self, t)
 
 
 class EndothermicBonding(PerfectContact):
@@ -180,9 +185,7 @@ class EndothermicBonding(PerfectContact):
         return "K_2 must be below T_0 (C_1 + C_2 + C_c), the capacity it takes away." if all_taken else ""
 
     def quantities(self, t: Array) -> Quantities:
-        bonds = _unbonded(self)
-        x, T, _, capacity = bonds.heated(t)
-        return bonds.exchanged(t, x, T, capacity)
+        return _from_reference(self, t)
 
 
 class BimolecularBonding(Reference):

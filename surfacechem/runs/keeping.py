@@ -258,8 +258,10 @@ class RunByRun:
                 row[f"time_{name}"] = event.t
                 row |= {f"{state}_at_{name}": event.before[columns[state]] for state in self.keep.at_events}
         for name, level in (self.keep.reach or {}).items():
-            at, leaps, column = run.column(name)[0], run.discontinuities, f"time_to_{name}"
+            start, leaps, column = run.column(name)[0][:1], run.discontinuities, f"time_to_{name}"
             leapt = leaps.t[crossed(leaps.before[name], leaps.after[name], level)]
-            if len(times := [*np.zeros(1)[begins(at[:1] - level, level)], *leapt]):
-                row[column] = min(row.get(column, np.inf), float(times[0]))
+            if begins(start - level, level).any():
+                row[column] = 0.0
+            elif len(leapt):
+                row[column] = min(row.get(column, np.inf), float(leapt[0]))
         return row

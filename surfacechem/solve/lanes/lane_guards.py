@@ -44,7 +44,7 @@ def start_margins(w: Any, fresh: Any) -> None:
 
 
 @compiled
-def any_marked_at_end(w: Any, lane: int) -> bool:
+def mark_at_end(w: Any, lane: int) -> bool:
     """Mark the kinks that reach zero at the end of a segment, as for a single run; True if there are any."""
     found = False
     for m in range(w.n_margins):

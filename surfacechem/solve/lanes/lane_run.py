@@ -11,9 +11,9 @@ import numpy as np
 
 from surfacechem.compile.vectors import LANES
 from surfacechem.solve.lanes.lane_guards import (
-    any_marked_at_end,
     ends_on_guard,
     find_crossings,
+    mark_at_end,
     may_cross,
     start_margins,
 )
@@ -290,7 +290,7 @@ def _go_on(w: Any, lane: int) -> None:
     # A step that ends just short of a kink at the end of the segment reaches the end, as far as time tells.
     near = w.landing[lane] > 0 and w.end[lane] - w.t[lane] <= NEWTON_EPS * w.t[lane] + RUN_EPS * w.h[lane]
     more = (whole or near) and w.segment[lane] + 2 < w.segments.shape[1]
-    if (more and any_marked_at_end(w, lane)) or w.landing[lane] > 0:
+    if (more and mark_at_end(w, lane)) or w.landing[lane] > 0:
         w.landing[lane], w.fresh[lane] = 0, 1.0
         if _write_events(w, lane):
             _end(w, lane, EVENT)
