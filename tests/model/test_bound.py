@@ -120,6 +120,14 @@ def test_the_bound_of_bonds_follows_densities_of_sites_that_a_run_changes(law, p
         assert found == pytest.approx(other.phi_max, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("sites", "named"), [(SITES, set()), (Sites(2e16, 1e16), {"N_2"}), (Sites(2e16, 1e16, 2), {"N_1"})]
+)
+def test_only_a_body_with_sites_of_its_own_has_a_density_beside_that_of_reference(sites, named):
+    roles = {role.variable for role in assemble(isothermal(MassAction(k_on=3.0, k_off=1.0), sites)).roles}
+    assert roles & {"N_1", "N_2"} == named
+
+
 MIXING = (LatticeGas, SITES, 1.0), (partial(PartnerMixing, a=1e-16), Sites(1e16, 5e15), 0.5)
 
 

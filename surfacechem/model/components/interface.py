@@ -131,9 +131,10 @@ def _site_densities(build: Build, sites: Sites) -> None:
     build.variables.define("N_c", partial(build.constant, "N_c", path, spec, sites.density), "constant", by)
     build.variables.define("n_c", n_c, "derived", by)
     for k, density in enumerate((sites.density_1, sites.density_2), start=1):
-        own = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0), density
-        amount = partial(build.constant, f"N_{k}", of[k - 1], *own)
-        build.variables.define(f"N_{k}", amount, "constant", by)
+        if density != sites.density:
+            own = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0), density
+            amount = partial(build.constant, f"N_{k}", of[k - 1], *own)
+            build.variables.define(f"N_{k}", amount, "constant", by)
         build.variables.define(f"n_{k}", partial(of_body, k, density), "derived", by)
 
 
