@@ -240,6 +240,10 @@ class Law(ABC):
         """Return the law with its varying parameters at their reference values."""
         return self.bind({name: value.value for name, value in self.varying.items()})
 
+    def source(self, argument: str) -> str:
+        """Return the variable of the scene that an argument stands for."""
+        return argument
+
     def refine(self, name: str, spec: Spec) -> Spec:
         """Return the specification of a parameter of this law, if its unit depends on the other fields."""
         return spec
@@ -314,6 +318,10 @@ class Factor(Law):
     of: str = option("variable it depends on", default="T_c")
 
     factor: ClassVar[Callable[..., Expression]]
+
+    def source(self, argument: str) -> str:
+        """Return the variable of the scene that an argument stands for; that of x is an option."""
+        return self.of if argument == "x" else argument
 
 
 class Potential(Law):

@@ -19,7 +19,7 @@ from surfacechem.model.automaton import Constraint, Edge, Equilibrium, Mode, Reg
 from surfacechem.model.balances import Node, PowerFlow, Rows
 from surfacechem.model.system import Account, Margin, Named, Note, Range, Role, State, definitions
 from surfacechem.model.variables import Parameters, Variables
-from surfacechem.quantities import Quantity
+from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body, Conduction, Interface, Scene, volume_shares
 from surfacechem.tolerances import NO_AMOUNT, RUN_EPS, TINY
 
@@ -413,14 +413,18 @@ class Build:
     def law_ranges(self, law: Law, own: Mapping[str, Expression]) -> None:
         """Add the ranges of variables that a run monitors for a law."""
         for name, (low, high) in law.ranges.items():
-            self.notes.append(Range(str(self._read(law, name, own)), low, high, law.title))
+            value = symengine.sympify(self._read(law, name, own))
+            if not value.is_Symbol and not self.is_named(name):  # a sum of coverages of bonds
+                value = self.name(VARIABLES[name], value)
+            self.notes.append(Range(str(value) if value.is_Symbol else name, low, high, law.title))
 
     def law_margins(self, law: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
         """Add the margins of the domain of a law, except for the bounds in ``met``, which its arguments satisfy."""
         ends = f"where the law {law.name()} ends"
         for name in law.positive:
             sought = name in self.motion.gap_rates and name not in self.scene.initial
-            margin = Margin(f"{name} > 0", self._read(law, name, own), f"{name} reached zero, {ends}", path=law.path)
+            value, reason = self._read(law, name, own), f"{law.source(name)} reached zero, {ends}"
+            margin = Margin(f"{name} > 0", value, reason, path=law.path)
             self.margins.append(margin._replace(remedy=STARTS.get(name, "") if sought else "", domain=True))
         for name in law.nonnegative:
             if name in met:
@@ -430,29 +434,29 @@ class Build:
             whole = self.expanded(value)
             rounding = sum((absolute(term) for term in whole.args), symengine.Integer(0)) if whole.is_Add else 0
             slack = NO_AMOUNT + RUN_EPS * rounding + RUN_EPS * absolute(least)
-            reason = f"{name} fell below {least if least != 0 else 'zero'}, {ends}"
+            reason = f"{law.source(name)} fell below {least if least != 0 else 'zero'}, {ends}"
             self.margins.append(Margin(f"{name} >= {least}", value - least + slack, reason, path=law.path))
         self._narrow_places(law, own, met)
-        self._limit_margins(law)
+        self._limit_margins(law, own)
 
-    def _limit_margins(self, law: Law) -> None:
+    def _limit_margins(self, law: Law, own: Mapping[str, Expression]) -> None:
         """Add the margins of the ranges of its variables that a law is made for."""
         for name, ends_of in law.limits.items():
-            value = self.variables.get(name, law)
+            value = self._read(law, name, own)
             told = [f"{end:g}" if isinstance(end, int | float) else str(end) for end in ends_of]
             given = [
                 each for each in zip((">=", "<="), ends_of, told, strict=True) if each[1] not in (-math.inf, math.inf)
             ]
             size = reduce(lambda a, b: where(a > b, a, b), [absolute(end) for _, end, _ in given])
             slack = NO_AMOUNT * size
-            reason = f"{name} left the range of {law.called}, {' to '.join(told)}"
+            reason = f"{law.source(name)} left the range of {law.called}, {' to '.join(told)}"
             for side, end, text in given:
                 inside = value - end + slack if side == ">=" else end + slack - value
                 self.margins.append(Margin(f"{name} {side} {text}", inside, reason, path=law.path, domain=True))
 
     def _read(self, law: Law, name: str, own: Mapping[str, Expression]) -> Expression:
         """Return the expression that a law reads by a name: from its own arguments, else from the scene."""
-        return own[name] if name in own else self.variables.get(name, law)
+        return own[name] if name in own else self.variables.get(law.source(name), law)
 
     def _narrow_places(self, law: Law, own: Mapping[str, Expression], met: Collection[str]) -> None:
         """Add margins that end steps at the kinks of a law, and at peaks that a step might pass over."""
@@ -485,8 +489,10 @@ class Build:
         self.margins += [item._replace(terminal=False, peak=True) for item in found if item.expression not in known]
 
     def varying_margins(self) -> None:
-        """Add margins that keep varying parameters in their range, with slack for roundoff at closed bounds."""
+        """Add margins that keep varying parameters and their factors in their range, with slack for roundoff."""
         found = []
+        for factor, bound, x in self.variables.factors:
+            self.law_domain(factor, bound, {} if x is None else {"x": x})
         for law, name, spec, value in self.variables.varying:
             slack = max(NO_AMOUNT * abs(getattr(law, name).value), TINY)  # zero is within a closed bound, too
             low, why = max(spec.above, spec.at_least), f"{law.title}: {name} left its range ({spec.range}) as it varies"

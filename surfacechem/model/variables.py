@@ -104,6 +104,8 @@ class Variables:
         self.roles: list[Role] = []
         self.varying: list[tuple[Law, str, Spec, Expression]] = []
         """Parameters whose factors may carry them out of their range: law, name, specification and expression."""
+        self.factors: list[tuple[Factor, Factor, Expression]] = []
+        """The factors of parameters that vary, as given and bound, with their variable; None for that of the scene."""
         self._makers: dict[str, Callable[[], Expression] | Expression] = {}
         self._symbols: dict[str, Expression] = {}
         self._bound: dict[Any, Any] = {}
@@ -192,8 +194,9 @@ class Variables:
         path = f"{law.path}.{name}"
         if isinstance(value, Varying):
             symbol = self.parameters.add(name + suffix, path, spec, value.value)
-            bound = [self.bind(item, f"{path}.{item.name()}", unit=unit_of(item.of)) for item in value.factors]
-            symbol = product(symbol, *map(self._factor, bound))
+            bound = [(item, self.bind(item, f"{path}.{item.name()}", unit=unit_of(item.of))) for item in value.factors]
+            self.factors += [(*pair, None) for pair in bound]
+            symbol = product(symbol, *(self.factor(factor) for _, factor in bound))
             low = max(spec.above, spec.at_least)
             bounded = low > 0 or math.isfinite(spec.at_most)
             if bounded or not all(factor.keeps_sign for factor in value.factors):
@@ -206,9 +209,10 @@ class Variables:
             return int(value) if float(value).is_integer() else value
         return self.parameters.add(name + suffix, path, spec, value)
 
-    def _factor(self, factor: Factor) -> Expression:
+    def factor(self, factor: Factor, own: Mapping[str, Expression] | None = None) -> Expression:
+        """Return the value of a bound factor; ``own`` has precedence over the variables of the scene."""
         if "T_0" in reads(factor.factor) and unit_of(factor.of) != "K":
             message = f"the factor {factor.name()} is one of temperature; of: {factor.of} is none. Use `linear`."
             raise InputError(message, factor.place)
-        sources = {argument: factor.of if argument == "x" else argument for argument in reads(factor.factor)}
-        return factor.factor(**{argument: self.get(source, factor) for argument, source in sources.items()})
+        names = [name for name in reads(factor.factor) if name not in (own or {})]
+        return factor.factor(**{name: self.get(factor.source(name), factor) for name in names}, **(own or {}))

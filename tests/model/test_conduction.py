@@ -13,6 +13,7 @@ import surfacechem
 from surfacechem import plots
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
+from surfacechem.laws.factors import Linear
 from surfacechem.references.base import SceneView
 from surfacechem.results import spatial
 from surfacechem.results.error_estimates import against_tighter, with_cells
@@ -88,8 +89,9 @@ def test_chains_are_solved_as_the_whole_matrix_is():
     np.testing.assert_allclose(other.outputs, ours.outputs, rtol=2e-7)
 
 
-def test_conductivity_that_varies_with_temperature():
+def test_conductivity_that_varies_with_temperature(monkeypatch: pytest.MonkeyPatch):
     """The steady flux through a slab is the mean conductivity times the gradient, for any cells."""
+    monkeypatch.setattr(Linear, "ranges", {"x": (200.0, 380.0)})
     varying = "{value: 0.2 W/m/K, times: [linear: {of: T_1, about: 300 K, slope: 0.004}]}"
     text = f"""
 bodies:
@@ -105,6 +107,9 @@ run: {{until: 1 hour}}
     run = Simulation(load_text(text)).run(error="balances")
     assert run.dataset.Q_T_far_1[-1] == pytest.approx(-0.2 * 1.2 * 100 / 2e-3, rel=1e-9)
     assert run.audit.violations == ()
+    assert "linear is an extrapolation: T_1 ran from 400 to 400, its range is 200 to 380" in run.warnings
+    with pytest.raises(InputError, match=r"conductivity left its range \(> 0\) as it varies"):
+        Simulation(load_text(text.replace("0.004", "-0.012"))).run()
 
 
 def test_a_search_that_ends_early_states_the_error_of_its_last_cells(monkeypatch: pytest.MonkeyPatch):

@@ -73,7 +73,7 @@ def test_a_parameter_that_varies_and_is_zero_is_in_its_range():
     assert run(Scene(bodies(), Interface(None), [law], loading, None, 300.0, APART), 1.5).status == "finished"
 
 
-def test_a_parameter_that_varies_out_of_its_range_stops_the_run():
+def test_a_parameter_that_varies_out_of_its_range_stops_the_run(monkeypatch: pytest.MonkeyPatch):
     law = PressureConductance(between=("lower", "upper"), h_c=1e3, H=varying(1e9, Linear(of="phi", slope=-1.5)))
     loading = {"phi": Ramp(start=0.1, rate=0.5), "p": Hold(level=1e6)}
     scene = Scene(bodies(), Interface(None), [law], loading, None, 300.0, APART)
@@ -84,6 +84,8 @@ def test_a_parameter_that_varies_out_of_its_range_stops_the_run():
     index = [margin.name for margin in trajectory.model.margins].index("T_1 > 0")
     jumped = trajectory.result._replace(status=Status.EVENT, events=SimpleNamespace(index=np.array([index])))
     assert "H left its range" in trajectory.model.verdict(trajectory.run, jumped, trajectory.values)[1]
+    monkeypatch.setattr(Linear, "limits", {"x": (0.0, 0.5)})
+    assert run(scene, 1.5).reason.startswith("phi left the range of the law linear, 0 to 0.5 at t = 0.8")
 
 
 def test_what_is_no_number_a_little_later_is_named():

@@ -6,6 +6,7 @@ capacity: the body's node, which heat paths, laws and perfect contact use. The r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -88,7 +89,7 @@ def _far_node(build: Build, number: int, body: Body, law: Conduction) -> Node:
 def _fluxes(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Iterator[PowerFlow]:
     """Yield the fluxes from node to node and through the far side."""
     name = slab.body.name
-    conductivity = _conductivity(build, slab, surface.name, bound.conductivity)
+    conductivity = _conductivity(build, slab, surface, bound.conductivity)
     links = list(pairwise((surface, *slab.behind)))
     widths = [b - a for a, b in pairwise(slab.points)]
     conductances = [
@@ -107,27 +108,31 @@ def _fluxes(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Itera
     yield from flows[1:]
 
 
-def _conductivity(build: Build, slab: Slab, surface: str, reference: Expression) -> Callable[[Expression], Expression]:
+def _conductivity(build: Build, slab: Slab, surface: Node, reference: Expression) -> Callable[[Expression], Expression]:
     """Return the conductivity as a function of the local temperature."""
     given = slab.law.conductivity
     if not isinstance(given, Varying):
         return lambda T: reference
-    own = {f"T_{slab.number}", surface}
+    own = {f"T_{slab.number}", surface.name}
     bound = []
     for factor in given.factors:
         others = {argument for argument in reads(factor.factor) if argument not in ("x", "T_0", factor.of)}
         if factor.of not in own or others:
             message = f"the conductivity of {slab.body.name} varies with its own temperature only: of: {min(own)}."
             raise InputError(message, factor.place)
-        bound.append(build.variables.bind(factor, f"bodies.{slab.body.name}.conduction.{factor.name()}", unit="K"))
+        path = f"bodies.{slab.body.name}.conduction.{factor.name()}"
+        bound.append((factor, build.variables.bind(factor, path, unit="K")))
 
     def conductivity(T: Expression) -> Expression:
-        value = reference
-        for factor in bound:
-            known = {name: build.variables.get(name, factor) for name in reads(factor.factor) if name == "T_0"}
-            value *= factor.factor(**{name: known.get(name, T) for name in reads(factor.factor)})
-        return value
+        read = ({name: T for name in reads(factor.factor) if name != "T_0"} for _, factor in bound)
+        values = (build.variables.factor(factor, own) for (_, factor), own in zip(bound, read, strict=True))
+        return math.prod(values, start=reference)
 
+    spec = dict(slab.law.specs())["conductivity"]
+    # Without sources inside, the extremes are those of the start or of the ends.
+    for T in (surface.T, slab.behind[0].T, slab.behind[-1].T):
+        build.variables.factors += [(*pair, T) for pair in bound]
+        build.variables.varying.append((slab.law, "conductivity", spec, conductivity(T)))
     return conductivity
 
 

@@ -138,7 +138,7 @@ def _paths(build: Build, law: HeatTransfer) -> Iterator[tuple[tuple[str, str], d
     bound = build.variables.bind(law, f"heat.{law.name()}")
     own = {"T_from": nodes[0].T, "T_to": nodes[1].T}
     channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
-    build.law_domain(law, bound, {})
+    build.law_domain(law, bound, own)
     if law.closure == "medium":
         centre = end_node(build, "interface", law)
         for ends, node in zip(((a, "interface"), ("interface", b)), nodes, strict=True):
