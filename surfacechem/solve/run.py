@@ -395,7 +395,8 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
     values = system.given_values.copy()
     if not changes:
         return values
-    specs = {s.path: POSITIVE_SPEC if s.given and not s.given.state else STATE_SPEC for s in system.states}
+    above_zero = {s.path for s in system.states if s.is_temperature or (s.given and not s.given.state)}
+    specs = {s.path: POSITIVE_SPEC if s.path in above_zero else STATE_SPEC for s in system.states}
     specs |= {parameter.path: parameter.spec for parameter in system.parameters}
     known = system.changeable
     for path, value in changes.items():

@@ -11,7 +11,14 @@ from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import CompliantDebonding, TensileStrength
 from surfacechem.laws.factors import Proportional
-from surfacechem.laws.free_energy import BondedContact, BondEnergy, BondStiffness, LinearEnthalpy, NormalStiffness
+from surfacechem.laws.free_energy import (
+    BondedContact,
+    BondEnergy,
+    BondStiffness,
+    LinearEnthalpy,
+    NormalStiffness,
+    Penalty,
+)
 from surfacechem.laws.friction import Viscous
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import (
@@ -115,6 +122,12 @@ def test_a_zero_is_found_where_a_value_alone_rounds_otherwise_than_among_others(
         return sign * (np.asarray(gaps) - zero + (rounding if len(gaps) == 1 else 0.0))
 
     assert next_root(curve, 1.0, -1.0, sign) == pytest.approx(zero, abs=2e-9)
+
+
+def test_a_change_that_leaves_nothing_to_bear_the_bodies_is_refused():
+    given = scene([Penalty(E_n=1e13)], {"w_n": Hold(level=1e-8)}, Mounting(k=1e12), {"g_n": 1e-8})
+    with pytest.raises(InputError, match=r"no potential bears the bodies in contact \(.*`penalty`"):
+        Model(assemble(given)).solve(Run(times=(0.0, 1.0)), {"interface.potential.penalty.E_n": 0.0})
 
 
 # -- masses and dampers that meet ------------------------------------------------------------------------------

@@ -196,6 +196,13 @@ run: {until: 1 s}
         Simulation(load_text(text.replace(old, new))).run()
 
 
+def test_a_run_changes_what_the_format_has_and_refuses_what_it_refuses():
+    runs = two(6, "convective").sweep({"bodies.upper.conduction.far.h": [50.0, 150.0]})
+    assert np.diff(runs["T_2"][..., -1].values.ravel()) > 2.0
+    with pytest.raises(InputError, match=r"initial.profile_1 = 0 is outside its range: > 0"):
+        two(6, perfect=True).run({"initial.profile_1": 0.0})
+
+
 def test_an_exact_solution_of_another_scene_is_not_used():
     law = "{potential: [constant-interface-capacity: {C_c: 1}], temperature: T}"
     varying = "{value: 1, times: [linear: {of: T_2, slope: 1e-3}]}"

@@ -32,8 +32,9 @@ def variables(build: Build) -> Iterator[PowerFlow | Thermal]:
         if law is None:
             continue
         _check(build, body, law)
-        # At the reference state: in the body the factors follow the local temperature.
-        bound = build.variables.bind(law.at_reference(), f"bodies.{body.name}.conduction", f"_{number}")
+        # In the body the factors follow the local temperature; the far side has its own section of a case.
+        reference = replace(law.at_reference(), h_far=None)
+        bound = build.variables.bind(reference, f"bodies.{body.name}.conduction", f"_{number}")
         resistances = {**thermal.resistances, body.name: bound.thickness / bound.conductivity}
         thermal = replace(thermal, resistances=resistances)
         if law.cells:
@@ -98,7 +99,8 @@ def _fluxes(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Itera
     if slab.law.h_far is not None:
         far = f"T_far_{slab.number}"
         links.append((slab.behind[-1], Node(far, symengine.Symbol(far), build.slope_of(far), prescribed=True)))
-        conductances.append(bound.h_far)
+        h_far, spec = f"h_far_{slab.number}", dict(slab.law.specs())["h_far"]
+        conductances.append(build.constant(h_far, f"{bound.path}.far.h", spec, slab.law.h_far))
     fluxes = [h * (a.T - b.T) for (a, b), h in zip(links, conductances, strict=True)]
     produced = (flux * (a.T - b.T) / (a.T * b.T) for (a, b), flux in zip(links, fluxes, strict=True))
     places = [name, *(b.name for _, b in links)]

@@ -165,10 +165,13 @@ def closing(build: Build, g: Any) -> Iterator[Margin | str]:
     deep = t_n.subs({g: DEEP_GAP, side: -1})
     borne = symengine.Integer(0) if deep == t_n.subs({g: TOUCH_GAP, side: 1}) else -deep
     without_bonds = borne.subs({bond.symbol: 0 for bond in build.bonding.values()})
-    if not build.at_start(without_bonds) <= NO_PRESSURE:  # not below, also if it is NaN
+    ends = "no potential bears the bodies in contact"
+    if not (least := build.at_start(without_bonds)) <= NO_PRESSURE:  # not below, also if it is NaN
+        if least > 0:  # other numbers than those of the scene must bear them, too
+            bears = Margin("p > 0 in contact", without_bonds - NO_PRESSURE, ends, remedy=CONTACT_REMEDY)
+            yield bears._replace(path="interface.potential", at_start=True)
         return
     if build.at_start(borne) <= NO_PRESSURE:
-        yield f"no potential bears the bodies in contact: the run ends if the gap closes. {CONTACT_REMEDY}"
+        yield f"{ends}: the run ends if the gap closes. {CONTACT_REMEDY}"
     margin = where(borne > NO_PRESSURE, 1, g + TOUCH_OVERLAP) if borne.free_symbols else g + TOUCH_OVERLAP
-    reason = "the gap closed, and no potential bears the bodies in contact"
-    yield Margin("g_n >= 0", margin, reason, remedy=CONTACT_REMEDY, domain=True)
+    yield Margin("g_n >= 0", margin, f"the gap closed, and {ends}", remedy=CONTACT_REMEDY, domain=True)
