@@ -351,7 +351,7 @@ def _normal(case: Document) -> Mounting | None:
     given = [k for k in map(_stiffness, case.bodies.values()) if k is not None]
     if not given:
         return normal
-    if normal is not None and normal.k:
+    if "normal" in (held := case.mechanics.tree.mapping()) and "k" in held["normal"].mapping():
         message = "the stiffness has two roles: give `k` here or a stiffness to the bodies."
         raise case.mechanics.error(message, "normal")
     return replace(normal or Mounting(), k=1 / sum(1 / k for k in given))

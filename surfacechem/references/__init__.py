@@ -12,7 +12,7 @@ from importlib import import_module
 from inspect import isabstract
 from pathlib import Path
 
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError, expect, suggestion
 from surfacechem.references.base import Reference, name_of
 
 __all__ = ["Reference", "all", "get", "known", "names"]
@@ -53,6 +53,7 @@ def get(name: str) -> type[Reference]:
     >>> get("sliding-constant-capacity").__name__
     'SlidingConstantCapacity'
     """
+    expect(name, str, "the name of an exact solution is a text")
     if not known(name):
         raise InputError(f"no exact solution '{name}'.{suggestion(name, names())}")
     return _members(_files(tuple(__path__))[name])[name]

@@ -168,6 +168,8 @@ class Simulation:
         Simulation
             Assembled and compiled when first needed; an InputError of the scene is raised then.
         """
+        expect(scene, Scene, "a simulation is one of a Scene")
+        expect(run, (Run, type(None)), "run is a Run")
         return cls(Case("scene", title, "", "", scene, run, None, None, "", None, {"": Place(title)}, ""))
 
     @cached_property

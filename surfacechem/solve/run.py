@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +26,7 @@ from surfacechem.compile.program import (
     key_of,
 )
 from surfacechem.contracts.terms import Spec
-from surfacechem.errors import PATHS, InputError, suggestion
+from surfacechem.errors import PATHS, InputError, expect, suggestion
 from surfacechem.model.assemble import StartLimits
 from surfacechem.model.system import System
 from surfacechem.solve import AUTO, CALLING_PYTHON, EXPLICIT, method, solver
@@ -62,6 +64,15 @@ COLDER_GUESSES = 0.95 ** np.arange(1, 40)
 STATE_SPEC, POSITIVE_SPEC = Spec("", "initial value"), Spec("", "initial value", above=0)
 """Ranges of initial values: finite, and positive if the logarithm is the state; margins check the rest."""
 
+RUN_RANGES = {
+    "rtol": Spec("1", "", above=0, at_most=math.nextafter(1, 0)),
+    "atol": Spec("1", "", at_least=0),
+    "accuracy": Spec("1", "", above=0, at_most=1),
+    "max_steps": Spec("1", "", at_least=1),
+    "max_seconds": Spec("s", "", above=0),
+}
+"""Ranges of the numbers of a run."""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -94,7 +105,7 @@ class Run:
 
     def __post_init__(self) -> None:
         """Check the tolerances, and that output times start at zero, where the initial values hold, and increase."""
-        if not isinstance(self.times, tuple):  # a list or an array, which compare in other ways
+        if not isinstance(self.times, tuple) or {*map(type, self.times)} - {int, float}:  # others compare in other ways
             try:
                 object.__setattr__(self, "times", tuple(map(float, self.times)))
             except (TypeError, ValueError):
@@ -104,12 +115,10 @@ class Run:
             raise InputError(
                 "output times must start at 0 and increase from each to the next, at least two, all finite."
             )
-        if self.max_steps < 1:
-            raise InputError(f"max_steps must be at least 1, not {self.max_steps}.")
-        if not (0 < self.rtol < 1 and 0 <= (self.atol or 0.0) < np.inf):
-            raise InputError(
-                f"rtol must lie in (0, 1), and atol must be finite and not negative: {self.rtol:g}, {self.atol}."
-            )
+        for name, spec in RUN_RANGES.items():
+            if (value := getattr(self, name)) is not None or getattr(Run, name) is not None:
+                expect(value, Real, f"{name} is a number")
+                spec.check(name, value)
 
     @cached_property
     def moments(self) -> Array:

@@ -50,6 +50,11 @@ MISTAKES = [
     ("C: 1 kJ/m^2/K}\n  up", "C: .nan}\n  up", "3: bodies.lower.C: C must be finite, got 'nan'."),
     ("lower: {", "lower: {E: 1e308, H: 1 mm, ", "3: bodies.lower.E: a stiffness of inf Pa/m is beyond the range of nu"),
     ("lower: {", "lower: {stiffness: 1e-320, ", "3: bodies.lower.stiffness: a stiffness of 9.99989e-321 Pa/m is bey"),
+    (
+        "}\nint",
+        ", stiffness: 1}\nmechanics: {normal: {k: 0}}\nint",
+        "5: mechanics.normal: the stiffness has two roles: ",
+    ),
     ("C: 1 kJ/m^2/K}\n  up", "capacity: cubic}\n  up", "3: bodies.lower.capacity: no capacity 'cubic'. Known: const"),
     ("C: 1 kJ/m^2/K}\n  up", "capacity: constant}\n  up", "3: bodies.lower: lower needs `C`: heat capacity per"),
     ("  upper:", "  lower:", "4: the key 'lower' is given twice, first in line 3."),

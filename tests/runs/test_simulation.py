@@ -46,7 +46,7 @@ def test_a_changed_run_can_be_run_again_from_its_file(simulation, tmp_path):
         ({"bodies.lower.C": "1 m"}, r"1 m is a length; bodies\.lower\.C needs a heat capacity per area"),
         ({"bodies.lower.c": 1}, r"no parameter 'bodies\.lower\.c' to change\. Did you mean 'bodies\.lower\.C'\?"),
         ({"initial.T": float("nan")}, r"initial\.T must be finite"),
-        ({"initial.T": -3.0}, r"at the start the temperature T reached zero"),
+        ({"initial.T": -3.0}, r"initial.T = -3 is outside its range: > 0"),
         ({"T_0": 0.0}, r"T_0 = 0 is outside its range: > 0"),
         ({"interface.sites": 0.0}, r"interface\.sites = 0 is outside its range: > 0"),
         ({"run.solver": "dop853"}, r"'run\.solver' is a key of the case, .*: give it to `load`, or to"),
@@ -77,7 +77,7 @@ def test_output_times_start_at_zero_and_increase(simulation, times):
 def test_settings_from_python_are_checked_like_those_of_a_case(simulation):
     settings = dataclasses.replace(simulation.case.run, times=np.linspace(0, 1, 3), picture=None)
     assert simulation.run(run=settings).dataset.time.values.tolist() == [0.0, 0.5, 1.0]
-    with pytest.raises(InputError, match="max_steps must be at least 1, not 0"):
+    with pytest.raises(InputError, match="max_steps = 0 is outside its range: >= 1"):
         simulation.run(run=dataclasses.replace(settings, max_steps=0))
     with pytest.raises(InputError, match=r"no solver 'radua'\. Did you mean 'radau'\?"):
         simulation.run(run=dataclasses.replace(settings, solver="radua"))
@@ -229,6 +229,11 @@ def test_what_is_no_case_is_refused(source, message):
         (lambda _: surfacechem.precision("exothermic", solvers="radau"), "a list of names is needed, not 'radau'"),
         (lambda _: surfacechem.steady("dna-adhesive", of=3), "a list of names is needed, not 3"),
         (lambda case: dataclasses.replace(case.case.run, times=3), "output times are a list of numbers, not 3"),
+        (lambda case: dataclasses.replace(case.case.run, times=(0, "a")), "output times are a list of numbers, not"),
+        (lambda case: dataclasses.replace(case.case.run, rtol="x"), "rtol is a number, not str"),
+        (lambda case: dataclasses.replace(case.case.run, accuracy=-1), "accuracy = -1 is outside its range: > 0"),
+        (lambda _: surfacechem.Simulation.of(3), "a simulation is one of a Scene, not int"),
+        (lambda _: surfacechem.references.get(3), "the name of an exact solution is a text, not int"),
         (lambda _: surfacechem.precision("exothermic", repeat="a"), "rounds are a whole number, not str"),
         (lambda _: stability(["endothermic"]), r"no regime '\['endothermic'\]'"),
     ],
