@@ -17,7 +17,7 @@ import surfacechem
 from surfacechem.format import load_text
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.factors import Power
-from surfacechem.laws.loading import Hold, Ramp
+from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.laws.longrange import LennardJonesFlatFlat
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
@@ -55,6 +55,20 @@ def test_a_soft_spring_on_a_zone_in_shear_snaps_where_the_tangent_is_lost(ratio)
     energy = [0.5 * k * (w - y * G_T) ** 2 - PHI * math.exp(-(y**2)) for y in (x, top)]
     assert trajectory.state(snap, "g_t") == pytest.approx(top * G_T, rel=1e-8)
     assert snap.released == pytest.approx(energy[0] - energy[1], rel=1e-7)
+
+
+@pytest.mark.parametrize("phase", [0.0, -0.9, -2.4])
+def test_a_zone_below_its_strength_follows_an_alternating_dead_load_through_touch(phase):
+    """Where it touches neither its gap nor its traction gives a stiffness to which that of a fold could be related."""
+    t_max, g_0, E_n, F = 3e3, 7e-9, 1.8e13, 2e3
+    zone = ExponentialCohesiveZone(t_max=t_max, g_0=g_0, E_n=E_n)
+    load = Harmonic(amplitude=F, frequency=1.0, phase=phase)
+    trajectory = closed(together([zone], loading={"F_n": load}, initial={"g_n": 1e-10}), 3.0, outputs=61)
+    assert set(trajectory.events) == {"touch", "release"}
+    force = F * np.sin(2 * np.pi * trajectory.result.times + phase)
+    apart = -g_0 * lambertw(-np.maximum(force, 0.0) / (math.e * t_max)).real
+    exact = apart + np.minimum(force, 0.0) / E_n
+    assert trajectory["g_n"] == pytest.approx(exact, abs=1e-9 * g_0)
 
 
 def opened(k, C):

@@ -119,19 +119,22 @@ def _coupled_nodes(build: Build, residuals: Sequence[Expression]) -> list[Node]:
 
 def _size(build: Build, gap: Equilibrium, own: Expression) -> Expression:
     """Return the reference stiffness of a gap, to which its stiffness is related [Pa/m]."""
-    far, g = build.motion.far_fields.get(gap.axis), symengine.Symbol(gap.state)
+    far = build.motion.far_fields.get(gap.axis)
     if far is not None and far.law.k != 0:
         return far.law.k + absolute(far.law.k - own)
-    if far is None:
-        return where(absolute(g) > 0, build.expanded(gap.size) / absolute(g), 1)
-    # The secant of the potential only: friction in parallel has no stiffness.
-    t = build.expanded(derivative(build.psi, g))
-    t = t if t != 0 else far.F - build.expanded(gap.residual)
-    # From the traction at zero gap, where attraction is not zero, or from zero traction, where repulsion has a wall.
-    closed = t.subs(g, 0)
-    rise = t if closed.has(symengine.nan, symengine.zoo, symengine.oo) else t - closed
-    secant = where(absolute(t) < absolute(rise), t, rise) * g
-    return where(secant > 0, secant / absolute(g) ** 2, where(absolute(own) > 0, absolute(own), 1))
+    # No secant, traction over gap: at zero load, or where the gap closes, it is a quotient of roundoff.
+    size = _uncancelled(own)
+    return where(size > 0, size, 1)
+
+
+def _uncancelled(e: Expression) -> Expression:
+    """Return an expression with each term of its sums by its magnitude, so that none cancel."""
+    if e.is_Add or e.is_Mul:
+        return e.func(*(_uncancelled(part) for part in e.args))
+    if isinstance(e, symengine.Piecewise):
+        sides = [_uncancelled(side) for side in e.args[::2]]
+        return symengine.Piecewise(*zip(sides, e.args[1::2], strict=True))
+    return absolute(e)
 
 
 def determinant(A: Matrix) -> Expression:
