@@ -407,12 +407,16 @@ class Build:
 
     def law_domain(self, law: Law, bound: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
         """Add where a law holds: the ranges that a run monitors, and the margins of its domain as ``bound``."""
-        self.law_ranges(law, own)
+        self.law_ranges(law, bound, own)
         self.law_margins(bound, own, met)
 
-    def law_ranges(self, law: Law, own: Mapping[str, Expression]) -> None:
-        """Add the ranges of variables that a run monitors for a law."""
-        for name, (low, high) in law.ranges.items():
+    def law_ranges(self, law: Law, bound: Law, own: Mapping[str, Expression]) -> None:
+        """Add the ranges of variables that a run monitors for a law, which vary with its parameters alone."""
+        if not law.ranges:
+            return
+        symbols = {item.path: item.symbol for item in self.parameters.items}
+        reference = bound.bind({name: symbols[f"{bound.path}.{name}"] for name in law.varying})
+        for name, (low, high) in reference.ranges.items():
             value = symengine.sympify(self._read(law, name, own))
             if not value.is_Symbol and not self.is_named(name):  # a sum of coverages of bonds
                 value = self.name(VARIABLES[name], value)

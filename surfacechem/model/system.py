@@ -196,11 +196,11 @@ class Margin(NamedTuple):
 
 
 class Range(NamedTuple):
-    """Range of validity of a law in one variable; outside, the law extrapolates."""
+    """Range of validity of a law in one variable; outside, the law extrapolates. Its ends depend on parameters."""
 
     variable: str
-    low: float
-    high: float
+    low: Expression
+    high: Expression
     law: str
 
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function
 from surfacechem.errors import MOST_LISTED, listed
-from surfacechem.expressions import EXPONENT_CAP
+from surfacechem.expressions import EXPONENT_CAP, without
 from surfacechem.model.system import Range, RatePair, System, Total
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.solve.contract import Array, Points
@@ -466,7 +466,7 @@ def findings(trajectory: Trajectory, found: Accuracy | None) -> Iterator[str]:
         rows = model.inputs(result, result.times, result.outputs, trajectory.rates, result.segment)
         if steps is not None:
             rows = np.concatenate([rows, model.inputs(result, steps.t, steps.y, steps.ydot, steps.segment)])
-    yield from extrapolations(system, trajectory.ranges)
+    yield from extrapolations(system, trajectory.ranges, trajectory.values)
     for law, exponents in system.capped_laws if len(rows) else ():
         largest = float(np.nanmax(exponents(rows), initial=-np.inf))
         if largest > EXPONENT_CAP:
@@ -507,13 +507,18 @@ def _lost_fluxes(trajectory: Trajectory) -> list[str]:
     return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
 
 
-def extrapolations(system: System, ranges: Mapping[str, tuple[float, float]]) -> list[str]:
-    """Return warnings about laws that are used outside their range, from the least and largest values by name."""
+def extrapolations(system: System, ranges: Mapping[str, tuple[float, float]], values: Mapping[str, float]) -> list[str]:
+    """Return warnings about laws that are used outside their range.
+
+    ``ranges`` are the least and largest values by name, ``values`` those of the parameters by path.
+    """
     found = []
+    numbers = {item.symbol: values[item.path] for item in system.parameters if item.path in values}
     for limit in system.notes_of(Range):
         low, high = ranges.get(limit.variable, (math.inf, -math.inf))
+        least, most = (float(without(end, numbers)) for end in (limit.low, limit.high))
         rounding = RUN_EPS * max(abs(low), abs(high))
-        if low < limit.low - rounding or high > limit.high + rounding:
+        if low < least - rounding or high > most + rounding:
             span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"
-            found.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")
+            found.append(f"{limit.law} is an extrapolation: {span}, its range is {least:g} to {most:g}")
     return found

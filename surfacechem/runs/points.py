@@ -462,5 +462,5 @@ def evaluation(evaluator: Evaluator, points: Points, **origin: Any) -> PointResu
     values, slopes, refused = evaluator.at(points)
     # A value that no point has, NaN at each, is in no range.
     ranges = {x.name: (np.nanmin(x.values, initial=np.inf), np.nanmax(x.values, initial=-np.inf)) for x in values}
-    warnings = extrapolations(evaluator.system, ranges)
+    warnings = extrapolations(evaluator.system, ranges, evaluator.system.given_values)
     return PointResults(values=values, slopes=slopes, refused=refused, warnings=warnings, **origin)

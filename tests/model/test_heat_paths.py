@@ -189,6 +189,8 @@ def test_the_ends_of_a_range_belong_to_it():
 def test_a_correlation_outside_its_range_says_so():
     law = CooperMikicYovanovich(between=ENDS, k=20.0, m=0.1, sigma=1e-6, H=2e9)
     inside = Solution(solved(direct([law], {"p": Hold(level=1e6)}), 0.0, 1.0))
+    softer = inside.trajectory.model.solve(inside.trajectory.run, {"heat.cooper-mikic-yovanovich.H": 2e7})
+    assert "ran from 1e+06 to 1e+06, its range is 20 to 460000" in Solution(softer).warnings[0]
     outside = Solution(solved(direct([law], {"p": Hold(level=1e9)}), 0.0, 1.0))
     assert inside.warnings == ()
     assert outside.warnings[0].startswith("cooper mikic yovanovich is an extrapolation: p ran from 1e+09 to 1e+09")

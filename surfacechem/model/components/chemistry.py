@@ -55,8 +55,8 @@ def laws(build: Build) -> Iterator[PowerFlow | Account | Caution | RatePair | Ma
     mu = _chemical_potentials(build)
     kinetics = {}
     for law in build.interface.reactions:
-        kinetics[build.unique(law.label)] = build.variables.bind(law, f"interface.bonding.{law.name()}")
-        build.law_ranges(law, {})
+        kinetics[build.unique(law.label)] = bound = build.variables.bind(law, f"interface.bonding.{law.name()}")
+        build.law_ranges(law, bound, {})
     pairs = opposed(kinetics)
     load = dead_load(build, kinetics, pairs)
     found = _with_rates(build, [_reaction(build, label, law, mu, load, pairs) for label, law in kinetics.items()])
