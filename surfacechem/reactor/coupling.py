@@ -83,6 +83,14 @@ class Gas(Receiver):
             raise InputError(f"{type(self).__name__} is an ideal gas, {other}. A solid or a liquid is a ReactingSolid.")
         self.weights = phase.molecular_weights
 
+    def state_at(self, x: Array) -> Array:
+        """Return pressure [Pa] and mole fractions at values of its variables; its phase has those of the present."""
+        parts = x[self.temperature + 1 :] / self.weights
+        whole, P = parts.sum(), self.phase.P  # type: ignore[attr-defined]
+        if self.temperature > 1:  # after mass and volume: the pressure is not held
+            P = x[0] / x[1] * whole * cantera.gas_constant * x[self.temperature]
+        return np.array([P, *parts / whole])
+
     def after_eval(self, t: float, _lhs: Any, rhs: Any) -> None:
         """Add to Cantera's balances of mass, energy and species; Cantera calls it after their evaluation."""
         rates, first, phase = np.asarray(rhs), self.temperature + 1, self.phase  # type: ignore[attr-defined]

@@ -17,6 +17,7 @@ import cantera
 import numpy as np
 
 from surfacechem.errors import InputError
+from surfacechem.reactor.coupling import Gas
 from surfacechem.reactor.interface_reactor import InterfaceReactor
 from surfacechem.solve.adapters.cantera_network import StateVectorReactor, last_step
 from surfacechem.solve.adapters.dense_step import DenseStep, Guards, first_crossing
@@ -193,12 +194,16 @@ class StepWatcher:
     def _parameters(self, item: InterfaceReactor, given: Given, t: float, y: Array) -> Array:
         """Return the parameters of an interface at a time in a step and the variables of the network then.
 
-        Reactors of Cantera cannot be set back to it; what edges depend on is read from their variables.
+        Reactors of Cantera cannot be set to it; what edges depend on is read from their variables.
         """
         self._set(y)
         parameters = item.parameters_at(t)
         for place, column in given:
             parameters[place] = y[column]
+        for beside in item.scene.neighbours:
+            if isinstance(beside.reactor, Gas):
+                state = beside.reactor.state_at(y[self._columns[beside.reactor]])
+                parameters[beside.places] = state[: len(beside.places)]
         return parameters
 
     def _set(self, y: Array) -> None:

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from surfacechem import load
 from surfacechem.errors import InputError
+from surfacechem.laws.friction import Coulomb
 from surfacechem.quantities import MOLECULAR
 from surfacechem.reactor import (
     InterfaceReactor,
@@ -346,3 +347,27 @@ def test_a_gas_that_flows_out_names_itself_where_its_mass_ends(start):
     clock = r"\. Times are resolved to 2e-16 s there: let `initial_time` be nearer to zero" if start else ""
     with pytest.raises(InterfaceStopped, match=rf"where bag: mass changes by \S+ of itself a second{clock}$"):
         net.advance(start + 1e-5)
+
+
+def test_a_jump_that_a_gas_decides_comes_in_its_time(monkeypatch):
+    """A block begins to slide at 0.9 of its friction, which falls with the pressure of a gas and its hydrogen."""
+
+    def traction(self, p, direction, p_gas, x_gas_H2):
+        return self.mu * p * direction * (2.5 - p_gas / ct.one_atm - x_gas_H2)
+
+    for method in ("limit", "traction"):
+        monkeypatch.setattr(Coulomb, method, traction)
+    rubs = HELD.replace("  mechanism:", "  friction: [{coulomb: {mu: 0.3}}]\n  mechanism:")
+    rubs = rubs.replace("initial: {", "initial: {u_t: 0, v: 0, ")
+    mounted = f"{rubs}mechanics: {{tangential: {{m: 1, k: 1e9, c_g: 1e5}}}}\nloading: {{p: 1 MPa, w_t: 0.27 mm}}\n"
+    gas, source = fuel(energy="off"), ct.Solution("sofc.yaml", "gas")
+    source.TPX = 1000, ct.one_atm, "H2:1"
+    lighter = source.mean_molecular_weight / gas.phase.mean_molecular_weight
+    _flow = ct.MassFlowController(ct.Reservoir(source, clone=True), gas, mdot=gas.mass * lighter)
+    block = InterfaceReactor(mounted, neighbours={"gas": gas}, area=1e-12)
+    net = network(gas, block)
+    net.rtol = 1e-9
+    net.advance(0.0682)
+    (slip,) = block.scene.events.instant.jumps
+    # The amount of gas is 1 + t and that of hydrogen 0.5 + t: 2.5 - (1 + t) - (0.5 + t) / (1 + t) = 0.9.
+    assert (slip.edge.name, slip.t) == ("slip forward", pytest.approx(np.sqrt(0.59) - 0.7, rel=1e-6))
