@@ -232,10 +232,3 @@ def test_a_folder_that_another_process_removes_is_no_error(tmp_path: Path, monke
 
     monkeypatch.setattr(os, "scandir", gone)
     assert kernelcache.untrusted(tmp_path / "kernel") is None
-
-
-def test_a_run_imports_no_compiler() -> None:
-    stepper.LOOP.load()
-    use = "surfacechem.run('debonding')"
-    code = f"import surfacechem, sys; {use}; assert not {{'numba', 'scipy', 'sksundae'}} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True)

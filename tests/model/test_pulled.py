@@ -184,16 +184,12 @@ def test_a_length_beside_springs_is_refused(tmp_path):
 
 def test_a_reversible_bell_reaction_under_a_prescribed_force_is_refused(tmp_path):
     reversible = "- {equation: a <=> b, type: Bell, rate-constant: {A: 2 1/s, b: 0, Ea: 0}, x-beta: 0.4 nm}\n"
-    case = pairs(tmp_path, reversible=reversible)
-    with pytest.raises(InputError, match=r"same equilibrium under any prescribed force.* two reactions with `=>`"):
-        case.run()
-
-
-def test_sweeps_name_the_mechanism_as_the_case_does(tmp_path):
-    reversible = "- {equation: a <=> b, type: Bell, rate-constant: {A: 2 1/s, b: 0, Ea: 0}, x-beta: 0.4 nm}\n"
-    case = pairs(tmp_path, reversible=reversible, force="0 pN")
-    with pytest.raises(InputError, match=r"^bonds\.yaml:\d+: "):
-        case.sweep({"loading.f": ["0 pN", "5 pN"]})
+    run, sweep = pairs(tmp_path, reversible=reversible).run, pairs(tmp_path, reversible=reversible, force="0 pN").sweep
+    told = r"bonds\.yaml:\d+: .* same equilibrium under any prescribed force.* two reactions with `=>`"
+    # A sweep names the mechanism as the case does, a run by its path.
+    for refused, start in ((run, ".*/"), (lambda: sweep({"loading.f": ["0 pN", "5 pN"]}), "")):
+        with pytest.raises(InputError, match=f"^{start}{told}"):
+            refused()
 
 
 DOWN, PRESS = "down: {w_n: -100 nm/s, for: 0.3 s}", "press: {w_n: -100 nm/s, until: {p: 1 kPa}}"

@@ -1,7 +1,6 @@
 """Names, files and laziness of the exact solutions."""
 
 import importlib.util
-import subprocess
 import sys
 from dataclasses import fields
 from pathlib import Path
@@ -35,18 +34,6 @@ def test_unknown_name():
     with pytest.raises(InputError) as error:
         references.get("endotermic-bonding")
     assert "no exact solution 'endotermic-bonding'. Did you mean 'endothermic-bonding'? Nearest of" in str(error.value)
-
-
-def test_one_name_imports_one_file_and_no_scipy():
-    script = """
-import sys
-from surfacechem.references import get
-get("sliding")
-loaded = [m.rpartition(".")[2] for m in sys.modules if m.startswith("surfacechem.references.")]
-print(sorted(loaded), "scipy" in sys.modules)
-"""
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "['base', 'numerics', 'sliding'] False"
 
 
 def test_times_of_any_shape():

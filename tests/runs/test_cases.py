@@ -1,7 +1,5 @@
 """Shipped cases, changed: exact solutions of other scenes are refused, what is compiled is used again."""
 
-import subprocess
-import sys
 from contextlib import suppress
 from dataclasses import replace
 
@@ -49,12 +47,6 @@ def test_a_stage_that_does_not_end_is_reported():
     # The sum 0.1 + 0.2 is above 0.3 by its rounding.
     changes = ["programme=[{approach: {w_n: -1 nm/s, for: 0.1 s}}, {hold: {for: 0.2 s}}]", "run.until=0.3 s"]
     assert surfacechem.run("press-hold-pull", changes).warnings == ()
-
-
-def test_only_the_families_of_laws_that_a_case_names_are_imported():
-    code = "import surfacechem, sys; surfacechem.load('exothermic'); print(*(m for m in sys.modules if '.laws.' in m))"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert {name.rpartition(".")[2] for name in found} == {"free_energy", "kinetics", "loading"}
 
 
 def test_a_run_with_changed_parameters_compiles_nothing(monkeypatch):

@@ -282,73 +282,47 @@ def test_threads_pieces_and_parts_change_no_byte(whole, tmp_path, monkeypatch):
     assert digest(tmp_path / "pieces.zarr") == digest(whole)
 
 
-SCRIPT = """
+GIVEN = ["sweep", "exothermic", "--over", f"{K_0}={{from: 100, to: 300, points: 60}}", "--set"]
+GIVEN += ["sweep.keep={last: [T, phi]}", "-o"]
+SLOW_COMMAND = """
 import sys, time
-from surfacechem.runs import checking, keeping, streaming
-from surfacechem.runs.checking import check
-streaming.EXPLICIT_RUNS = 16
-import surfacechem
+from surfacechem.cli import app
 from surfacechem.results.store import Store
+from surfacechem.runs import checking, keeping, streaming
+streaming.EXPLICIT_RUNS = 16
 write = Store.write
 def slowly(self, number, *chunk):
     write(self, number, *chunk)
     time.sleep(60 if number else 0)
 Store.write = slowly
+app(sys.argv[1:])
 """
-STREAM = """
-simulation = surfacechem.load("exothermic", {over})
-simulation.stream(simulation.plan(), sys.argv[1], resume="resume" in sys.argv).run(1)
-"""
-GIVEN = ["sweep", "exothermic", "--over", f"{K_0}={{from: 100, to: 300, points: 60}}", "--set"]
-GIVEN += ["sweep.keep={last: [T, phi]}", "-o"]
-COMMAND = """
-from surfacechem.cli import app
-app([*{given}, sys.argv[1]])
-"""
+"""The command, with a long pause after its second chunk, in which it is ended."""
+INTERRUPTED = "surfacechem: interrupted; what is stored is kept: go on with --resume.\n"
 
 
-def script(last=STREAM):
-    """Code that computes a sweep, with a long pause after its second chunk, in which it is ended."""
-    section = {"over": {K_0: {"from": 100, "to": 300, "points": 60}}, "keep": ENDS}
-    return SCRIPT + last.replace("{over}", repr({"sweep": section})).replace("{given}", repr(GIVEN))
-
-
-def test_a_killed_writer_loses_at_most_a_chunk_and_no_byte(whole, tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_an_ended_writer_loses_at_most_a_chunk_and_no_byte(whole, tmp_path, number):
+    told, code = ("", -number) if number == signal.SIGKILL else (INTERRUPTED, 128 + number)
     path = tmp_path / "o.zarr"
-    writer = subprocess.Popen([sys.executable, "-c", script(), str(path)])
-    while not (path / ".marks" / "1").exists():
-        assert writer.poll() is None
-        time.sleep(0.01)
-    with pytest.raises(InputError, match="another process is writing part 1-of-1"):
-        stored(path, resume=True)
-    writer.send_signal(signal.SIGKILL)
-    writer.wait()
-    marks = sorted(file.name for file in (path / ".marks").iterdir())
-    assert set(marks) == {"0", "1", "writer-1-of-1"}
-    told = []
-    stored(path, resume=True, on_progress=told.append)
-    assert told[0].resumed == 16 * (len(marks) - 1)
-    assert told[-1].done == told[-1].runs == 60
-    assert digest(path) == digest(whole)
-
-
-def test_an_interrupt_says_how_to_go_on(whole, tmp_path):
-    path = tmp_path / "o.zarr"
-    command = [sys.executable, "-c", script(COMMAND), str(path)]
+    resume = [*GIVEN, str(path), "--resume", "-q"]
     # Processes in the background of a shell are started with interrupts ignored.
     own = signal.signal(signal.SIGINT, signal.SIG_DFL)
-    writer = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    writer = subprocess.Popen([sys.executable, "-c", SLOW_COMMAND, *resume[:-2]], stderr=subprocess.PIPE, text=True)
     signal.signal(signal.SIGINT, own)
     while not (path / ".marks" / "1").exists():
         assert writer.poll() is None, writer.communicate()
         time.sleep(0.01)
-    writer.send_signal(signal.SIGINT)
-    assert writer.communicate()[1] == "surfacechem: interrupted; what is stored is kept: go on with --resume.\n"
-    assert writer.returncode == 128 + signal.SIGINT
-    assert CliRunner().invoke(app, [*GIVEN, str(path), "--resume", "-q"]).exit_code == 0
-    # The command has also checked the errors of its runs.
-    found, wanted = (opened(which).drop_dims(["checked", "hardest"]).load() for which in (path, whole))
-    xarray.testing.assert_equal(found, wanted)
+    assert "another process is writing part 1-of-1" in CliRunner().invoke(app, resume).output
+    writer.send_signal(number)
+    assert (writer.communicate()[1], writer.returncode) == (told, code)
+    assert {file.name for file in (path / ".marks").iterdir()} - {"writer-1-of-1"} == {"0", "1"}
+    kept = {file: file.stat().st_mtime_ns for file in path.glob("*_last/c/[01]")}
+    assert CliRunner().invoke(app, resume).exit_code == 0
+    assert kept == {file: file.stat().st_mtime_ns for file in kept}
+    found, wanted = digest(path), digest(whole)
+    chunks = {file for file in wanted if "c" in file.parts}
+    assert {file: found[file] for file in chunks} == {file: wanted[file] for file in chunks}
 
 
 def test_a_damaged_chunk_is_computed_again(whole, tmp_path):

@@ -184,15 +184,6 @@ def test_what_is_wrong_is_told_before_anything_is_integrated(tmp_path, monkeypat
         data(tmp_path, "", text.replace(old, new))
 
 
-def test_a_scene_without_surfaces_imports_nothing_of_them():
-    import subprocess
-    import sys
-
-    code = "import sys, surfacechem; surfacechem.run('exothermic'); print([m for m in sys.modules if 'surfaces' in m])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
-
-
 def test_a_ball_pressed_into_a_penalty_has_its_area_of_contact(tmp_path):
     law = "  laws: [penalty: {E_n: 1e15 Pa/m}]\n  approach: {from: -2 nm, to: 9 nm}\n"
     text = law + "loading: {g_n: {ramp: {start: 1 nm, rate: -2 mm/s}}}\n" + START + RUN
