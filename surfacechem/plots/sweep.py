@@ -107,6 +107,11 @@ def final_values(dataset: Data, name: str) -> Array:
     return np.where(style.has_no_end(dataset, *style.WITHOUT_END), np.nan, values)
 
 
+def ends_are_known(dataset: Data, names: Sequence[str]) -> bool:
+    """True if the last values are those at the ends of all runs, none of which stopped after its last output."""
+    return all(f"{name}_last" in dataset for name in names) or not style.has_no_end(dataset, style.STOPPED).any()
+
+
 def subsample(dataset: Data, name: str) -> Array:
     """Return the values of a variable, of an evenly spread subset if there are many runs."""
     series = len(dataset[name].dims) > len(dataset["status"].dims)
@@ -557,9 +562,7 @@ def _draw_final(ax: Axes, dataset: Data, names: Sequence[str]) -> None:
             kw: Any = {"linestyle": "none"} if style.is_mode(dataset[name]) else {}
             marker = style.marker(ax, 0 if kw else len(x))
             ax.plot(x, values, marker=marker, markersize=style.MARKER_SIZE, label=words, **kw)
-    # The last output is the end of a run unless that stopped after it.
-    known = all(f"{name}_last" in dataset for name in names) or not style.has_no_end(dataset, style.STOPPED).any()
-    which = ("Final " if known else "Last output ") if at_end else ""
+    which = ("Final " if ends_are_known(dataset, names) else "Last output ") if at_end else ""
     said = f"{which}{style.quantity_words(dataset[names[0]]) if len(names) == 1 else 'value'}"
     values, error = np.stack(list(ends.values())), style.error_of(dataset, names)
     style.label(ax.yaxis, said, unit(dataset[names[0]]), values, error=error)
